@@ -23,8 +23,8 @@ static size_t stride_of(const char *array, size_t count, size_t size)
     return stride;
 }
 
-/* Replaces arrays by defs of the present size, in the arena. A NULL array or one that is too long is not read:
- * drape_compile_check_def reports missing arrays and refuses such counts. */
+/* Replaces arrays by defs of the present size, in the arena. A NULL array or one that is too long is not
+ * read: drape_compile_check_def reports missing arrays and refuses such counts. */
 static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
                                  char *def)
 {

@@ -164,7 +164,7 @@ static void cut_ears(polygon *p, int count)
     int ring[MAX_EARS];
     bool ear[MAX_EARS];
     double normal[3];
-    /* Newell's normal (Sutherland, Sproull and Schumacker 1974, doi:10.1145/356625.356626): twice the area. */
+    /* Newell's normal, twice the area (Sutherland, Sproull and Schumacker 1974, doi:10.1145/356625.356626) */
     memset(normal, 0, 3 * sizeof *normal);
     for (int i = 1; i + 1 < count; i++) {
         double one[3];

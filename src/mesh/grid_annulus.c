@@ -52,7 +52,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
             x[1] = 0;
             x[2] = -radius * sine;
         }
-    /* Letters as in grid.h, with r outwards. A node of a rotated circle lies between two of the next circle. */
+    /* Letters as in grid.h, with r outwards. A node of a rotated circle lies between two of the next one. */
     int32_t *next = mesh->triangle;
     for (int32_t r = 0; r + 1 < mesh->rows; r++)
         for (int32_t k = 0; k < mesh->columns; k++) {

@@ -58,47 +58,32 @@ void drape_sequence_points(const drape_sequence *frames, double t, double *x)
     frame_points(frames, t, 0, numbers_of(frames), x);
 }
 
-static void frame_velocities(const drape_sequence *frames, double within, size_t first, size_t count,
-                             double *v)
-{
-    const int32_t k = frame_before(frames, within);
-    memset(v, 0, count * sizeof *v);
-    if (k < 0 || k + 1 >= frames->frame_count)
-        return;
-    const double *from = frame_at(frames, k) + first, *to = frame_at(frames, k + 1) + first,
-                 span = frames->time[k + 1] - frames->time[k];
-    for (size_t i = 0; i < count; i++)
-        v[i] = (to[i] - from[i]) / span;
-}
-
 /* ---- Paths of a host ---- */
 
-/* Cubic Hermite interpolation, as that of the paths of motion.c. */
-static void path_points(const drape_deformation *d, double t, size_t first, size_t count, double *x)
+void drape_cubic_values(const double times[2], const double *const x[2], const double *const v[2], double t,
+                        size_t count, double *out)
 {
-    const double *x0 = d->x[0] + first, *x1 = d->x[1] + first, *v0 = d->v[0] + first, *v1 = d->v[1] + first;
-    if (t <= d->t[0] || t >= d->t[1]) {
-        memcpy(x, t >= d->t[1] ? x1 : x0, count * sizeof *x);
+    if (t <= times[0] || t >= times[1]) {
+        memcpy(out, x[t >= times[1]], count * sizeof *out);
         return;
     }
-    const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
+    const double h = times[1] - times[0], s = (t - times[0]) / h;
     const double rise = s * s * (3 - 2 * s), leave = s * (1 - s) * (1 - s), arrive = s * s * (s - 1);
     for (size_t i = 0; i < count; i++)
-        x[i] = x0[i] + rise * (x1[i] - x0[i]) + h * (leave * v0[i] + arrive * v1[i]);
+        out[i] = x[0][i] + rise * (x[1][i] - x[0][i]) + h * (leave * v[0][i] + arrive * v[1][i]);
 }
 
-static void path_velocities(const drape_deformation *d, double t, double within, size_t first, size_t count,
-                            double *v)
+void drape_cubic_rates(const double times[2], const double *const x[2], const double *const v[2], double t,
+                       double within, size_t count, double *out)
 {
-    const double *x0 = d->x[0] + first, *x1 = d->x[1] + first, *v0 = d->v[0] + first, *v1 = d->v[1] + first;
-    if (within < d->t[0] || within >= d->t[1]) {
-        memset(v, 0, count * sizeof *v);
+    if (within < times[0] || within >= times[1]) {
+        memset(out, 0, count * sizeof *out);
         return;
     }
-    const double h = d->t[1] - d->t[0], s = (t - d->t[0]) / h;
+    const double h = times[1] - times[0], s = (t - times[0]) / h;
     for (size_t i = 0; i < count; i++)
-        v[i] =
-            6 * s * (1 - s) * (x1[i] - x0[i]) / h + (1 - s) * (1 - 3 * s) * v0[i] + s * (3 * s - 2) * v1[i];
+        out[i] = 6 * s * (1 - s) * (x[1][i] - x[0][i]) / h + (1 - s) * (1 - 3 * s) * v[0][i] +
+                 s * (3 * s - 2) * v[1][i];
 }
 
 static bool rests_at_end(const drape_deformation *d)
@@ -137,7 +122,8 @@ void drape_deformation_send(drape_deformation *d, double t, double span, const d
 static void points_from(const drape_deformation *d, double t, size_t first, size_t count, double *x)
 {
     if (d->given)
-        path_points(d, t, first, count, x);
+        drape_cubic_values(d->t, (const double *const[]){d->x[0] + first, d->x[1] + first},
+                           (const double *const[]){d->v[0] + first, d->v[1] + first}, t, count, x);
     else
         frame_points(d->frames, t, first, count, x);
 }
@@ -145,10 +131,19 @@ static void points_from(const drape_deformation *d, double t, size_t first, size
 static void velocities_from(const drape_deformation *d, double t, double within, size_t first, size_t count,
                             double *v)
 {
-    if (d->given)
-        path_velocities(d, t, within, first, count, v);
-    else
-        frame_velocities(d->frames, within, first, count, v);
+    if (d->given) {
+        drape_cubic_rates(d->t, (const double *const[]){d->x[0] + first, d->x[1] + first},
+                          (const double *const[]){d->v[0] + first, d->v[1] + first}, t, within, count, v);
+        return;
+    }
+    const int32_t k = frame_before(d->frames, within);
+    memset(v, 0, count * sizeof *v);
+    if (k < 0 || k + 1 >= d->frames->frame_count)
+        return;
+    const double *from = frame_at(d->frames, k) + first, *to = frame_at(d->frames, k + 1) + first,
+                 span = d->frames->time[k + 1] - d->frames->time[k];
+    for (size_t i = 0; i < count; i++)
+        v[i] = (to[i] - from[i]) / span;
 }
 
 void drape_deformation_points(const drape_deformation *d, double t, double *x)

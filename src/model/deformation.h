@@ -34,6 +34,13 @@ void drape_deformation_corners(const drape_deformation *d, const int32_t *triang
 void drape_deformation_corner_velocities(const drape_deformation *d, const int32_t *triangle, double t,
                                          double within, double v[9]);
 
+/* `count` numbers of a cubic with the values x and the rates v at the times t[0] < t[1], and their rates: Hermite
+ * interpolation at s = (t - t0)/(t1 - t0). At rest before and after; `within` as above. */
+void drape_cubic_values(const double times[2], const double *const x[2], const double *const v[2], double t,
+                        size_t count, double *out);
+void drape_cubic_rates(const double times[2], const double *const x[2], const double *const v[2], double t,
+                       double within, size_t count, double *out);
+
 /* As drape_motion_next_kink and drape_motion_at_kink. */
 double drape_deformation_next_kink(const drape_deformation *d, double t, double end);
 bool drape_deformation_at_kink(const drape_deformation *d, double t);

@@ -66,20 +66,16 @@ static void derivatives(const drape_history *h, size_t key, double first[2], dou
     second[1] = (2 * first[0] + 4 * first[1] - 6 * secant) / length;
 }
 
-static bool is_kink(const drape_history *h, size_t key)
-{
-    double first[2][2] = {{0}}, second[2][2] = {{0}};
-    if (key > 0)
-        derivatives(h, key - 1, first[0], second[0]);
-    derivatives(h, key, first[1], second[1]);
-    return first[0][1] != first[1][0] || second[0][1] != second[1][0];
-}
-
 double drape_history_next_kink(const drape_history *h, double t, double end)
 {
-    for (size_t k = keys_until(h, t); k < h->key_count && h->time[k] < end; k++)
-        if (is_kink(h, k))
+    for (size_t k = keys_until(h, t); k < h->key_count && h->time[k] < end; k++) {
+        double first[2][2] = {{0}}, second[2][2] = {{0}};
+        if (k > 0)
+            derivatives(h, k - 1, first[0], second[0]);
+        derivatives(h, k, first[1], second[1]);
+        if (first[0][1] != first[1][0] || second[0][1] != second[1][0])
             return h->time[k];
+    }
     return end;
 }
 

@@ -1,9 +1,12 @@
 /* model.c: queries on a compiled scene. */
 #include "model/model.h"
 
+#include "base/elementary.h"
 #include "base/rotation.h"
 #include "base/vec3.h"
 #include "model/track.h"
+
+#include <math.h>
 
 void drape_model_destroy(drape_model **model)
 {
@@ -158,6 +161,36 @@ int drape_model_couplings(const drape_model *model, const bool *without, drape_c
         couplings[count++] =
             (drape_coupling){.count = model->image_coupled_count, .nodes = 2, .node = model->image_coupled};
     return count;
+}
+
+/*
+ * Principal strains of triangles. Let D = (x1 - x0, x2 - x0) be the edge vectors, and R the same at rest, in a
+ * frame of the triangle whose first axis is its first edge. The deformation gradient is F = D R^-1 (3 x 2). The
+ * principal stretches are the square roots of the eigenvalues of F'F, a symmetric 2 x 2 matrix.
+ */
+void drape_model_strain(const drape_model *model, const double *x, double *strain)
+{
+    if (!model || !x || !strain)
+        return;
+    for (const int32_t *n = model->triangle; n < model->triangle + 3 * (size_t)model->triangle_count;
+         n += 3) {
+        double a[3], b[3], normal[3], u[3], v[3], f[2][3];
+        vec3_sub(model->rest + 3 * (size_t)n[1], model->rest + 3 * (size_t)n[0], a);
+        vec3_sub(model->rest + 3 * (size_t)n[2], model->rest + 3 * (size_t)n[0], b);
+        vec3_sub(x + 3 * (size_t)n[1], x + 3 * (size_t)n[0], u);
+        vec3_sub(x + 3 * (size_t)n[2], x + 3 * (size_t)n[0], v);
+        vec3_cross(a, b, normal);
+        /* R = (l, p; 0, h): b is p along the first edge and h across; R^-1 = (1/l, -p/(l h); 0, 1/h). */
+        const double l = vec3_norm(a), p = vec3_dot(a, b) / l, h = vec3_norm(normal) / l;
+        for (int k = 0; k < 3; k++) {
+            f[0][k] = u[k] / l;
+            f[1][k] = (v[k] - p * f[0][k]) / h;
+        }
+        const double c00 = vec3_dot(f[0], f[0]), c01 = vec3_dot(f[0], f[1]), c11 = vec3_dot(f[1], f[1]),
+                     mean = 0.5 * (c00 + c11), spread = drape_hypot(0.5 * (c00 - c11), c01);
+        *strain++ = sqrt(mean + spread) - 1;
+        *strain++ = sqrt(fmax(0, mean - spread)) - 1;
+    }
 }
 
 double drape_model_mean_edge(const drape_model *m)

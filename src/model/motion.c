@@ -19,20 +19,6 @@ static size_t pinned_count(const drape_model *m)
     return (size_t)(m->node_count - m->block_count);
 }
 
-static void take_tracks(drape_motion *motion)
-{
-    const drape_model *m = motion->model;
-    motion->moved_count = m->moved_count;
-    for (int32_t i = 0; i < m->node_count; i++)
-        motion->place[i] = -1;
-    for (int32_t i = 0; i < m->moved_count; i++) {
-        motion->moved_node[i] = m->moved_node[i];
-        motion->moved_track[i] = m->moved_track[i];
-        motion->ride[i] = m->ride ? m->ride[m->moved_node[i]] : drape_ride_none();
-        motion->place[m->moved_node[i]] = i;
-    }
-}
-
 drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out)
 {
     const size_t pins = pinned_count(model);
@@ -58,34 +44,31 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
             return DRAPE_E_MEMORY;
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    take_tracks(motion);
+    const drape_model *m = motion->model;
+    motion->moved_count = m->moved_count;
+    for (int32_t i = 0; i < m->node_count; i++)
+        motion->place[i] = -1;
+    for (int32_t i = 0; i < m->moved_count; i++) {
+        motion->moved_node[i] = m->moved_node[i];
+        motion->moved_track[i] = m->moved_track[i];
+        motion->ride[i] = m->ride ? m->ride[m->moved_node[i]] : drape_ride_none();
+        motion->place[m->moved_node[i]] = i;
+    }
     return DRAPE_OK;
 }
 
 /* ---- Paths ---- */
 
-/* Cubic Hermite interpolation at s = (t - t0)/(t1 - t0) of the path. */
-static void path_displacement(const drape_path *w, double t, double x[3])
+static void path_displacement(const drape_path *path, double t, double x[3])
 {
-    if (t <= w->t[0] || t >= w->t[1]) {
-        memcpy(x, w->x[t >= w->t[1]], 3 * sizeof *x);
-        return;
-    }
-    double h = w->t[1] - w->t[0], s = (t - w->t[0]) / h;
-    double rise = s * s * (3 - 2 * s), leave = s * (1 - s) * (1 - s), arrive = s * s * (s - 1);
-    for (int k = 0; k < 3; k++)
-        x[k] = w->x[0][k] + rise * (w->x[1][k] - w->x[0][k]) + h * (leave * w->v[0][k] + arrive * w->v[1][k]);
+    drape_cubic_values(path->t, (const double *const[]){path->x[0], path->x[1]},
+                       (const double *const[]){path->v[0], path->v[1]}, t, 3, x);
 }
 
-static void path_velocity(const drape_path *w, double t, double within, double v[3])
+static void path_velocity(const drape_path *path, double t, double within, double v[3])
 {
-    memset(v, 0, 3 * sizeof *v);
-    if (within < w->t[0] || within >= w->t[1])
-        return;
-    double h = w->t[1] - w->t[0], s = (t - w->t[0]) / h;
-    for (int k = 0; k < 3; k++)
-        v[k] = 6 * s * (1 - s) * (w->x[1][k] - w->x[0][k]) / h + (1 - s) * (1 - 3 * s) * w->v[0][k] +
-               s * (3 * s - 2) * w->v[1][k];
+    drape_cubic_rates(path->t, (const double *const[]){path->x[0], path->x[1]},
+                      (const double *const[]){path->v[0], path->v[1]}, t, within, 3, v);
 }
 
 static bool rests(const double v[3])
@@ -258,11 +241,6 @@ static void spin_on(const course *c, double t, double within, double w[3])
         drape_placement_turn(c->placed, w, w);
 }
 
-static bool arrives_at_rest(const course *c)
-{
-    return rests(c->path->v[1]) && (!c->turn || rests(c->turn->rate[1]));
-}
-
 /* Looks for the first kink after t and before `end`, which it becomes, and for one at t. */
 typedef struct kink_search {
     double t, end;
@@ -284,7 +262,7 @@ static void meet_kinks(const course *c, kink_search *s)
     if (path->given) {
         if (!path->smooth)
             meet_kink(s, path->t[0]);
-        if (!arrives_at_rest(c))
+        if (!(rests(c->path->v[1]) && (!c->turn || rests(c->turn->rate[1]))))
             meet_kink(s, path->t[1]);
     } else if (c->ride) {
         s->at = s->at || c->ride->since == s->t;
@@ -628,44 +606,21 @@ static void place_points(const drape_motion *motion, int32_t collider, double t,
         drape_pose_point(&pose, x + 3 * (size_t)p, x + 3 * (size_t)p);
 }
 
-static double work_on_points(const drape_motion *motion, int32_t collider, const double *force, double t0,
-                             double t1)
-{
-    const drape_deformation *d = &motion->deformation[collider];
-    double work = 0;
-    place_points(motion, collider, t0, d->spare[0]);
-    place_points(motion, collider, t1, d->spare[1]);
-    for (size_t i = 0; i < 3 * (size_t)d->frames->node_count; i++)
-        work += force[i] * (d->spare[1][i] - d->spare[0][i]);
-    return work;
-}
-
-static double power_on_points(const drape_motion *motion, int32_t collider, const double *force, double t,
-                              double within)
-{
-    const drape_deformation *d = &motion->deformation[collider];
-    drape_collider_pose pose;
-    double power = 0;
-    drape_motion_pose(motion, collider, t, within, &pose);
-    drape_motion_points(motion, collider, t, d->spare[0]);
-    drape_motion_point_velocities(motion, collider, t, within, d->spare[1]);
-    for (size_t p = 0; p < (size_t)d->frames->node_count; p++) {
-        double v[3];
-        drape_pose_point_velocity(&pose, d->spare[0] + 3 * p, d->spare[1] + 3 * p, v);
-        power += vec3_dot(force + 3 * p, v);
-    }
-    return power;
-}
-
 double drape_motion_collider_work(const drape_motion *motion, const drape_load *load, double t0, double t1)
 {
     double work = 0;
     for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
+        const drape_deformation *d = &motion->deformation[c];
         drape_collider_pose before, after;
         if (!drape_motion_moves_collider(motion, c))
             continue;
         if (load[c].on_points) {
-            work += work_on_points(motion, c, load[c].on_points, t0, t1);
+            double on_points = 0;
+            place_points(motion, c, t0, d->spare[0]);
+            place_points(motion, c, t1, d->spare[1]);
+            for (size_t i = 0; i < 3 * (size_t)d->frames->node_count; i++)
+                on_points += load[c].on_points[i] * (d->spare[1][i] - d->spare[0][i]);
+            work += on_points;
             continue;
         }
         drape_motion_pose(motion, c, t0, t0, &before);
@@ -680,13 +635,21 @@ double drape_motion_collider_power(const drape_motion *motion, const drape_load 
 {
     double power = 0;
     for (int32_t c = 0; load && c < motion->model->collider_count; c++) {
+        const drape_deformation *d = &motion->deformation[c];
         drape_collider_pose pose;
-        if (load[c].on_points) {
-            power += power_on_points(motion, c, load[c].on_points, t, within);
+        drape_motion_pose(motion, c, t, within, &pose);
+        if (!load[c].on_points) {
+            drape_load_add_power(&load[c], &pose, &power);
             continue;
         }
-        drape_motion_pose(motion, c, t, within, &pose);
-        drape_load_add_power(&load[c], &pose, &power);
+        double v[3], on_points = 0;
+        drape_motion_points(motion, c, t, d->spare[0]);
+        drape_motion_point_velocities(motion, c, t, within, d->spare[1]);
+        for (size_t p = 0; p < (size_t)d->frames->node_count; p++) {
+            drape_pose_point_velocity(&pose, d->spare[0] + 3 * p, d->spare[1] + 3 * p, v);
+            on_points += vec3_dot(load[c].on_points + 3 * p, v);
+        }
+        power += on_points;
     }
     return power;
 }
@@ -708,16 +671,6 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
     drape_path path = path_to(&c, t, span, x, v);
     motion->collider_turn[collider] = turn_to(&c, t, span, rotation, v ? w : NULL, &path.smooth);
     motion->collider_path[collider] = path;
-}
-
-static void place_turn(const drape_placement *by, drape_turn_path *turn)
-{
-    double from[9];
-    memcpy(from, turn->from, sizeof from);
-    drape_rotation_product(by->turn, from, turn->from);
-    drape_placement_turn(by, turn->turn, turn->turn);
-    for (int i = 0; i < 2; i++)
-        drape_placement_turn(by, turn->rate[i], turn->rate[i]);
 }
 
 bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
@@ -746,7 +699,13 @@ void drape_motion_place_collider(drape_motion *motion, int32_t collider, const d
 {
     compose(by, &motion->collider_placed[collider]);
     place_path(by, &motion->collider_path[collider]);
-    place_turn(by, &motion->collider_turn[collider]);
+    double from[9];
+    memcpy(from, motion->collider_turn[collider].from, sizeof from);
+    drape_rotation_product(by->turn, from, motion->collider_turn[collider].from);
+    drape_placement_turn(by, motion->collider_turn[collider].turn, motion->collider_turn[collider].turn);
+    for (int i = 0; i < 2; i++)
+        drape_placement_turn(by, motion->collider_turn[collider].rate[i],
+                             motion->collider_turn[collider].rate[i]);
 }
 
 /* ---- Another motion ---- */
@@ -825,13 +784,6 @@ static void keep_pose(drape_motion *motion, int32_t collider, const drape_collid
     shift_by_pivot(R, by, placed->shift);
 }
 
-static bool same_points(const drape_collider_shape *a, const drape_collider_shape *b)
-{
-    return a->point_count == b->point_count &&
-           (a->point_count == 0 ||
-            memcmp(a->point, b->point, 3 * (size_t)a->point_count * sizeof *a->point) == 0);
-}
-
 void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before, double t)
 {
     const drape_model *m = motion->model;
@@ -844,7 +796,11 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
         motion->collider_path[c] = from->collider_path[before[c]];
         motion->collider_turn[c] = from->collider_turn[before[c]];
         motion->collider_placed[c] = from->collider_placed[before[c]];
-        if (same_points(&m->colliders[c].shape, &from->model->colliders[before[c]].shape))
+        if (m->colliders[c].shape.point_count == from->model->colliders[before[c]].shape.point_count &&
+            (m->colliders[c].shape.point_count == 0 ||
+             memcmp(m->colliders[c].shape.point, from->model->colliders[before[c]].shape.point,
+                    3 * (size_t)m->colliders[c].shape.point_count * sizeof *m->colliders[c].shape.point) ==
+                 0))
             drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
         keep_pose(motion, c, &from->model->colliders[before[c]], t);
     }
@@ -852,14 +808,6 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
 }
 
 /* ---- Checkpoints ---- */
-
-static bool is_path(const drape_path *path)
-{
-    bool good = isfinite(path->t[0]) && isfinite(path->t[1]) && path->t[0] <= path->t[1];
-    for (int i = 0; i < 2; i++)
-        good = good && drape_all_finite(path->x[i], 3) && drape_all_finite(path->v[i], 3);
-    return good;
-}
 
 static void archive_path(drape_path *path, drape_archive *a)
 {
@@ -872,7 +820,10 @@ static void archive_path(drape_path *path, drape_archive *a)
         drape_archive_doubles(a, path->x[i], 3);
         drape_archive_doubles(a, path->v[i], 3);
     }
-    if (drape_archive_has_read(a) && !is_path(path))
+    bool good = isfinite(path->t[0]) && isfinite(path->t[1]) && path->t[0] <= path->t[1];
+    for (int i = 0; i < 2; i++)
+        good = good && drape_all_finite(path->x[i], 3) && drape_all_finite(path->v[i], 3);
+    if (drape_archive_has_read(a) && !good)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
 }
 
@@ -927,22 +878,6 @@ static void archive_placement(drape_placement *placed, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a placement that is not finite");
 }
 
-/* Pins with a track come first, in the model's order, then the others in the order in which the host moved
- * them. */
-static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
-{
-    int32_t node = a->reading ? -1 : motion->moved_node[i];
-    drape_archive_int32(a, &node);
-    if (!drape_archive_has_read(a))
-        return;
-    bool good = node >= 0 && node < motion->model->node_count && motion->model->pinned[node] &&
-                (i < motion->model->moved_count ? motion->place[node] == i : motion->place[node] < 0);
-    if (good)
-        find_place(motion, node);
-    else
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is not pinned", (int)node);
-}
-
 void drape_motion_archive(drape_motion *motion, drape_archive *a)
 {
     int32_t count = motion->moved_count;
@@ -952,7 +887,19 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         (count < motion->model->moved_count || count > (int32_t)pinned_count(motion->model)))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves %d pins", (int)count);
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
-        archive_place(motion, i, a);
+        /* Pins with a track come first, in the model's order, then the others in the order in which the
+         * host moved them. */
+        int32_t node = a->reading ? -1 : motion->moved_node[i];
+        drape_archive_int32(a, &node);
+        if (drape_archive_has_read(a)) {
+            bool good = node >= 0 && node < motion->model->node_count && motion->model->pinned[node] &&
+                        (i < motion->model->moved_count ? motion->place[node] == i : motion->place[node] < 0);
+            if (good)
+                find_place(motion, node);
+            else
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is not pinned",
+                                   (int)node);
+        }
         if (drape_archive_good(a))
             archive_path(&motion->pin_path[i], a);
         if (drape_archive_good(a))
@@ -971,25 +918,10 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
 
 /* ---- All pins and colliders ---- */
 
-/* The track of a pin that holds a node along a direction only. */
-static course support_course(const drape_motion *motion, int32_t i, int direction)
-{
-    static const drape_path none;
-    const int32_t track = motion->model->supports[i].track[direction];
-    return (course){.path = &none, .track = track >= 0 ? &motion->model->tracks[track] : NULL};
-}
-
-/* The turns of a track, if clamped edges follow them. */
-static course clamp_course(const drape_motion *motion, int32_t track)
-{
-    static const drape_path none;
-    const drape_track *of = &motion->model->tracks[track];
-    return (course){.path = &none, .turns = of->clamps ? &of->turns : NULL};
-}
-
 /* All but those of histories. */
 static kink_search find_kinks(const drape_motion *motion, double t, double end)
 {
+    static const drape_path none;
     const drape_model *m = motion->model;
     kink_search s = {.t = t, .end = end};
     for (int32_t i = 0; i < motion->moved_count; i++) {
@@ -1004,13 +936,11 @@ static kink_search find_kinks(const drape_motion *motion, double t, double end)
     }
     for (int32_t i = 0; i < m->support_count; i++)
         for (int d = 0; d < m->supports[i].count; d++) {
-            const course c = support_course(motion, i, d);
-            meet_kinks(&c, &s);
+            const int32_t track = m->supports[i].track[d];
+            meet_kinks(&(course){.path = &none, .track = track >= 0 ? &m->tracks[track] : NULL}, &s);
         }
-    for (int32_t i = 0; i < m->track_count; i++) {
-        const course c = clamp_course(motion, i);
-        meet_kinks(&c, &s);
-    }
+    for (int32_t i = 0; i < m->track_count; i++) /* turns that clamped edges follow */
+        meet_kinks(&(course){.path = &none, .turns = m->tracks[i].clamps ? &m->tracks[i].turns : NULL}, &s);
     return s;
 }
 

@@ -27,31 +27,28 @@ static bool are_free(const drape_model *m, const images *of)
 /* ---- Vectors ---- */
 
 /* row: of each node in v, free_of_node; NULL: its number. */
-static void take_mean(const images *of, const int32_t *row, double *v)
+static void project(const drape_model *m, const int32_t *row, double *v)
 {
-    double mean[3] = {0};
-    for (int32_t i = 0; i < of->count; i++)
-        vec3_add_scaled(1.0 / of->count, v + 3 * (size_t)(row ? row[of->node[i]] : of->node[i]), mean);
-    for (int32_t i = 0; i < of->count; i++)
-        memcpy(v + 3 * (size_t)(row ? row[of->node[i]] : of->node[i]), mean, sizeof mean);
+    for (int32_t s = 0; s < m->image_set_count; s++) {
+        const images of = images_in(m, s);
+        double mean[3] = {0};
+        if (!are_free(m, &of))
+            continue;
+        for (int32_t i = 0; i < of.count; i++)
+            vec3_add_scaled(1.0 / of.count, v + 3 * (size_t)(row ? row[of.node[i]] : of.node[i]), mean);
+        for (int32_t i = 0; i < of.count; i++)
+            memcpy(v + 3 * (size_t)(row ? row[of.node[i]] : of.node[i]), mean, sizeof mean);
+    }
 }
 
 void drape_periodic_project(const drape_model *m, double *nodes)
 {
-    for (int32_t s = 0; s < m->image_set_count; s++) {
-        const images of = images_in(m, s);
-        if (are_free(m, &of))
-            take_mean(&of, NULL, nodes);
-    }
+    project(m, NULL, nodes);
 }
 
 void drape_periodic_project_free(const drape_model *m, double *free_nodes)
 {
-    for (int32_t s = 0; s < m->image_set_count; s++) {
-        const images of = images_in(m, s);
-        if (are_free(m, &of))
-            take_mean(&of, m->free_of_node, free_nodes);
-    }
+    project(m, m->free_of_node, free_nodes);
 }
 
 void drape_periodic_hold(const drape_model *m, const double *x0, double *x)
@@ -121,20 +118,6 @@ static void average_blocks(const drape_model *m, const drape_pattern *p, const i
         }
 }
 
-/* Adds s (I - P), of the size of a block s. */
-static void add_across(const drape_model *m, const drape_pattern *p, const images *of, double scale,
-                       double *values)
-{
-    for (int32_t i = 0; i < of->count; i++)
-        for (int32_t j = 0; j < of->count; j++) {
-            int64_t stride;
-            double *block =
-                block_at(p, values, m->free_of_node[of->node[i]], m->free_of_node[of->node[j]], &stride);
-            for (int c = 0; c < 3; c++)
-                block[c * stride + c] += scale * ((i == j) - 1.0 / of->count);
-        }
-}
-
 void drape_periodic_project_matrix(const drape_model *m, const drape_pattern *p, double *values)
 {
     for (int32_t s = 0; s < m->image_set_count; s++) {
@@ -155,6 +138,13 @@ void drape_periodic_project_matrix(const drape_model *m, const drape_pattern *p,
             average_blocks(m, p, &of, p->block_row[k], false, values);
         for (int32_t k = p->block_start[first]; k < p->block_start[first + 1]; k++)
             average_blocks(m, p, &of, p->block_row[k], true, values);
-        add_across(m, p, &of, scale > 0 ? scale : 1, values);
+        scale = scale > 0 ? scale : 1;
+        for (int32_t k = 0; k < of.count * of.count; k++) { /* adds s (I - P), of the size of a block s */
+            const int32_t i = of.node[k / of.count], j = of.node[k % of.count];
+            int64_t stride;
+            double *block = block_at(p, values, m->free_of_node[i], m->free_of_node[j], &stride);
+            for (int c = 0; c < 3; c++)
+                block[c * stride + c] += scale * ((i == j) - 1.0 / of.count);
+        }
     }
 }

@@ -38,16 +38,6 @@ void drape_render_positions(const drape_model *model, int32_t cloth, const doubl
     }
 }
 
-/* Weights of a place within the triangle: extrapolation would give a speed or an energy that is nowhere. */
-static void weights_within(const drape_embedded *e, double weights[3])
-{
-    double sum = 0;
-    for (int a = 0; a < 3; a++)
-        sum += weights[a] = fmax(e->weights[a], 0);
-    for (int a = 0; a < 3; a++)
-        weights[a] /= sum;
-}
-
 void drape_render_values(const drape_model *model, const double *values, int width, double *out)
 {
     const size_t w = (size_t)width;
@@ -57,12 +47,14 @@ void drape_render_values(const drape_model *model, const double *values, int wid
         if (!to->bound)
             memcpy(out, values + w * (size_t)model->cloths[c].first_node, w * count * sizeof *out);
         for (size_t i = 0; to->bound && i < count; i++) {
-            double weights[3];
-            weights_within(&to->bound[i], weights);
+            /* of a place within the triangle: extrapolation would give a speed or an energy that is nowhere */
+            double weights[3], sum = 0;
+            for (int a = 0; a < 3; a++)
+                sum += weights[a] = fmax(to->bound[i].weights[a], 0);
             for (size_t k = 0; k < w; k++) {
                 out[w * i + k] = 0;
                 for (int a = 0; a < 3; a++)
-                    out[w * i + k] += weights[a] * values[w * (size_t)to->bound[i].node[a] + k];
+                    out[w * i + k] += weights[a] / sum * values[w * (size_t)to->bound[i].node[a] + k];
             }
         }
         out += w * count;

@@ -61,20 +61,6 @@ drape_context *drape_scene_context(drape_scene *scene)
     return scene->ctx;
 }
 
-/* Messages are one line, and a place must leave room for the fault itself: of a long path only the end is
- * kept. */
-static char *shown_name(drape_scene *scene, const char *name)
-{
-    size_t length = strlen(name);
-    char text[MAX_NAME + 4];
-    const char *end = length > MAX_NAME ? name + length - MAX_NAME : name;
-    while (end > name && ((unsigned char)*end & 0xC0) == 0x80)
-        end++;
-    snprintf(text, sizeof text, "%s%s", end > name ? "..." : "", end);
-    drape_make_printable(text);
-    return drape_arena_text(&scene->kept, text);
-}
-
 /* "a/b.json" -> "a", "/b.json" -> "/", "b.json" -> NULL. */
 static drape_status keep_folder(drape_scene *scene, const char *path)
 {
@@ -95,7 +81,16 @@ static drape_status new_scene(drape_context *ctx, const char *name, drape_scene 
         return DRAPE_E_MEMORY;
     scene->ctx = ctx;
     scene->kept = scene->defs = drape_arena_of(ctx);
-    scene->name = shown_name(scene, name);
+    /* Messages are one line, and a place must leave room for the fault itself: of a long path only the
+     * end is kept. */
+    size_t length = strlen(name);
+    char text[MAX_NAME + 4];
+    const char *end = length > MAX_NAME ? name + length - MAX_NAME : name;
+    while (end > name && ((unsigned char)*end & 0xC0) == 0x80)
+        end++;
+    snprintf(text, sizeof text, "%s%s", end > name ? "..." : "", end);
+    drape_make_printable(text);
+    scene->name = drape_arena_text(&scene->kept, text);
     if (!scene->name)
         drape_scene_destroy(&scene);
     *out = scene;
@@ -117,19 +112,6 @@ static drape_status cannot_read(drape_scene *scene, const char *why)
                       "%s: cannot read the scene: %s", scene->name, why);
 }
 
-/* Doubles the buffer and keeps the bytes used so far. */
-static drape_status grow(drape_scene *scene, size_t used, size_t *room)
-{
-    char *larger = drape_alloc(scene->ctx, 2 * *room + 1, 1);
-    if (!larger)
-        return DRAPE_E_MEMORY;
-    memcpy(larger, scene->text, used);
-    drape_free(scene->ctx, scene->text);
-    scene->text = larger;
-    *room *= 2;
-    return DRAPE_OK;
-}
-
 /* Reads to the end of the file: the size of a pipe is known only then, and a file may grow while it is
  * read. A device may have no end: after a byte 0, which no scene has, reading ends, too. */
 static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t *size)
@@ -138,10 +120,15 @@ static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t
     scene->text = drape_alloc(scene->ctx, room + 1, 1);
     drape_status status = scene->text ? DRAPE_OK : DRAPE_E_MEMORY;
     for (bool zero = false; !status && !zero && !feof(file);) {
-        if (*size == room)
-            status = grow(scene, *size, &room);
-        if (status)
-            break;
+        if (*size == room) {
+            char *larger = drape_alloc(scene->ctx, 2 * room + 1, 1);
+            if (!larger)
+                return DRAPE_E_MEMORY;
+            memcpy(larger, scene->text, *size);
+            drape_free(scene->ctx, scene->text);
+            scene->text = larger;
+            room *= 2;
+        }
         errno = 0;
         const size_t count = fread(scene->text + *size, 1, room - *size, file);
         zero = memchr(scene->text + *size, 0, count) != NULL;
@@ -387,44 +374,29 @@ static drape_status parse_value(drape_scene *scene, const char *text, json_t **v
     return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
 }
 
-/* Finds the element of an array that a key names; *element stays NULL for "-". */
-static drape_status find_element(drape_scene *scene, const char *pointer, const landing *at, json_t **element)
-{
-    size_t index, size = json_array_size(at->container);
-    char why[80];
-    if (strcmp(at->key, "-") == 0)
-        return DRAPE_OK;
-    if (!drape_pointer_index(at->key, &index))
-        return cannot_set(scene, pointer, at->path.text,
-                          "is an array: its elements have numbers, \"-\" appends");
-    *element = json_array_get(at->container, index);
-    if (*element)
-        return DRAPE_OK;
-    snprintf(why, sizeof why, "is an array of %zu; \"-\" appends", size);
-    return cannot_set(scene, pointer, at->path.text, why);
-}
-
+/* What the last key of a pointer names in its container; *child stays NULL if that is a new member, or "-". */
 static drape_status find_child(drape_scene *scene, const char *pointer, const landing *at, json_t **child)
 {
+    const bool array = json_is_array(at->container);
     char given[80], why[120];
+    size_t index;
     *child = NULL;
-    if (json_is_array(at->container))
-        return find_element(scene, pointer, at, child);
-    if (json_is_object(at->container)) {
+    if (json_is_object(at->container))
         *child = json_object_get(at->container, at->key);
+    if (json_is_object(at->container) || (array && strcmp(at->key, "-") == 0))
         return DRAPE_OK;
-    }
+    if (array && !drape_pointer_index(at->key, &index))
+        return cannot_set(scene, pointer, at->path.text,
+                          "is an array: its elements have numbers, \"-\" appends");
+    *child = json_array_get(at->container, array ? index : 0);
+    if (*child)
+        return DRAPE_OK;
     drape_json_describe(at->container, given, sizeof given);
-    snprintf(why, sizeof why, "is %s, not an object or array", given);
-    return cannot_set(scene, pointer, at->path.text, why);
-}
-
-static void extend_path(landing *at)
-{
-    if (json_is_array(at->container) && strcmp(at->key, "-") == 0)
-        drape_pointer_push_index(&at->path, json_array_size(at->container));
+    if (array)
+        snprintf(why, sizeof why, "is an array of %zu; \"-\" appends", json_array_size(at->container));
     else
-        drape_pointer_push(&at->path, at->key);
+        snprintf(why, sizeof why, "is %s, not an object or array", given);
+    return cannot_set(scene, pointer, at->path.text, why);
 }
 
 /* Follows a non-empty pointer as far as it exists in the tree; changes nothing. */
@@ -438,7 +410,10 @@ static drape_status land(drape_scene *scene, const char *pointer, landing *at)
         drape_status status = find_child(scene, pointer, at, &child);
         if (status)
             return status;
-        extend_path(at);
+        if (json_is_array(at->container) && strcmp(at->key, "-") == 0)
+            drape_pointer_push_index(&at->path, json_array_size(at->container));
+        else
+            drape_pointer_push(&at->path, at->key);
     } while (child && *at->rest);
     return DRAPE_OK;
 }
@@ -495,25 +470,6 @@ static drape_status new_override(drape_scene *scene, const char *path, const cha
     return DRAPE_OK;
 }
 
-/* Takes over the reference to value. */
-static drape_status replace_root(drape_scene *scene, json_t *value)
-{
-    if (!json_is_object(value)) {
-        json_decref(value);
-        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene can only be set to an object");
-    }
-    json_decref(scene->root);
-    scene->root = value;
-    return DRAPE_OK;
-}
-
-/* Takes over the reference to value. */
-static drape_status insert(drape_scene *scene, landing *at, json_t *value)
-{
-    value = wrap(at->rest, value);
-    return value && put(at->container, at->key, value) == 0 ? DRAPE_OK : drape_fail_memory(scene->ctx, 1);
-}
-
 /* Everything that can fail, except for memory, comes before the first change. */
 static drape_status set_value(drape_scene *scene, const char *pointer, const char *text)
 {
@@ -533,11 +489,21 @@ static drape_status set_value(drape_scene *scene, const char *pointer, const cha
         status = new_override(scene, at.path.text, pointer, text, &o);
     if (!status)
         status = parse_value(scene, text, &value);
-    if (!status)
-        status = *pointer ? insert(scene, &at, value) : replace_root(scene, value);
-    if (!status)
-        scene->last = o;
-    return status;
+    if (status)
+        return status;
+    if (*pointer) {
+        value = wrap(at.rest, value);
+        if (!value || put(at.container, at.key, value))
+            return drape_fail_memory(scene->ctx, 1);
+    } else if (json_is_object(value)) {
+        json_decref(scene->root);
+        scene->root = value;
+    } else {
+        json_decref(value);
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene can only be set to an object");
+    }
+    scene->last = o;
+    return DRAPE_OK;
 }
 
 /* The elements of an array behind a removed one are no longer where the text has them: the whole array counts
@@ -599,22 +565,17 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
 
 /* ---- Defs and faults ---- */
 
-static drape_status read_tree(drape_scene *scene, drape_scene_def *def)
+drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
 {
+    locale_t old = drape_locale_enter();
+    drape_arena_free(&scene->defs);
     drape_status status = DRAPE_OK;
     json_decref(scene->ours);
     scene->ours = NULL;
     if (drape_scene_is_cs184(scene->root))
         status = drape_scene_from_cs184(scene->ctx, scene->root, &scene->ours);
-    return status ? status
-                  : drape_scene_read(scene->ctx, &scene->defs, scene->ours ? scene->ours : scene->root, def);
-}
-
-drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
-{
-    locale_t old = drape_locale_enter();
-    drape_arena_free(&scene->defs);
-    drape_status status = read_tree(scene, def);
+    if (!status)
+        status = drape_scene_read(scene->ctx, &scene->defs, scene->ours ? scene->ours : scene->root, def);
     def->folder = scene->folder;
     drape_locale_leave(old);
     if (status)
@@ -627,14 +588,6 @@ static bool leads_to(const char *pointer, const char *other)
 {
     size_t length = strlen(pointer);
     return strncmp(pointer, other, length) == 0 && (other[length] == 0 || other[length] == '/');
-}
-
-static const override *override_above(const drape_scene *scene, const char *pointer)
-{
-    const override *o = scene->last;
-    while (o && !leads_to(o->pointer, pointer))
-        o = o->before;
-    return o;
 }
 
 /* Returns the latest override inside the part of a pointer that the text does not contain. */
@@ -662,7 +615,9 @@ static const override *override_beside(const drape_scene *scene, const char *poi
 static void place_of(const drape_scene *scene, const char *pointer, char *place, size_t size)
 {
     size_t offset, line, column;
-    const override *o = override_above(scene, pointer);
+    const override *o = scene->last;
+    while (o && !leads_to(o->pointer, pointer))
+        o = o->before;
     bool found = drape_text_find(scene->text, pointer, &offset);
     if (!o && !found)
         o = override_beside(scene, pointer);

@@ -116,24 +116,18 @@ static drape_status check_object(drape_context *ctx, const object *o, json_t *va
     return DRAPE_OK;
 }
 
-static bool is_known(const char *name)
-{
-    for (size_t i = 0; i < OBJECTS; i++)
-        if (strcmp(objects[i].name, name) == 0)
-            return true;
-    for (int i = 0; ours[i]; i++)
-        if (strcmp(ours[i], name) == 0)
-            return true;
-    return false;
-}
-
 static drape_status check_keys(drape_context *ctx, json_t *root)
 {
     static const char *const theirs[] = {"cloth", "sphere", "plane"};
     for (void *it = json_object_iter(root); it; it = json_object_iter_next(root, it)) {
         const char *name = json_object_iter_key(it);
         drape_pointer at = {.length = 0};
-        if (is_known(name))
+        bool known = false;
+        for (size_t i = 0; i < OBJECTS; i++)
+            known = known || strcmp(objects[i].name, name) == 0;
+        for (int i = 0; ours[i]; i++)
+            known = known || strcmp(ours[i], name) == 0;
+        if (known)
             continue;
         const char *meant = drape_did_you_mean(name, theirs, 3);
         drape_pointer_push(&at, name);
@@ -150,24 +144,6 @@ static double number_of(json_t *object_value, const char *name)
     return json_number_value(json_object_get(object_value, name));
 }
 
-/* Checks one pin at its pointer. */
-static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
-{
-    if (json_array_size(pin) != 2)
-        return refuse(ctx, at, pin, "a pin", "[x, y]");
-    for (size_t i = 0; i < 2; i++) {
-        json_t *value = json_array_get(pin, i);
-        double number = json_number_value(value);
-        if (json_is_number(value) && number >= 0 && number < points[i] && number == floor(number))
-            continue;
-        char expected[60];
-        snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[i] - 1);
-        drape_pointer_push_index(at, i);
-        return refuse(ctx, at, value, i ? "y of a pin" : "x of a pin", expected);
-    }
-    return DRAPE_OK;
-}
-
 static drape_status check_pins(drape_context *ctx, json_t *cloth)
 {
     json_t *pins = json_object_get(cloth, "pinned");
@@ -179,23 +155,23 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
     if (pins && !json_is_array(pins))
         return refuse(ctx, &at, pins, "pinned", "an array of [x, y], numbers of points of the grid from 0");
     for (size_t i = 0; i < json_array_size(pins); i++) {
+        json_t *pin = json_array_get(pins, i);
         drape_pointer_push_index(&at, i);
-        drape_status status = check_pin(ctx, &at, json_array_get(pins, i), points);
-        if (status)
-            return status;
+        if (json_array_size(pin) != 2)
+            return refuse(ctx, &at, pin, "a pin", "[x, y]");
+        for (size_t k = 0; k < 2; k++) {
+            json_t *value = json_array_get(pin, k);
+            const double number = json_number_value(value);
+            if (json_is_number(value) && number >= 0 && number < points[k] && number == floor(number))
+                continue;
+            char expected[60];
+            snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[k] - 1);
+            drape_pointer_push_index(&at, k);
+            return refuse(ctx, &at, value, k ? "y of a pin" : "x of a pin", expected);
+        }
         drape_pointer_cut(&at, mark);
     }
     return DRAPE_OK;
-}
-
-static drape_status check_normal(drape_context *ctx, json_t *plane)
-{
-    json_t *normal = json_object_get(plane, "normal");
-    for (size_t i = 0; i < json_array_size(normal); i++)
-        if (json_number_value(json_array_get(normal, i)) != 0)
-            return DRAPE_OK;
-    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "0 0 0 has no direction")
-                  : DRAPE_OK;
 }
 
 static drape_status check(drape_context *ctx, json_t *root)
@@ -208,7 +184,13 @@ static drape_status check(drape_context *ctx, json_t *root)
     }
     if (!status)
         status = check_pins(ctx, json_object_get(root, "cloth"));
-    return status ? status : check_normal(ctx, json_object_get(root, "plane"));
+    json_t *normal = json_object_get(json_object_get(root, "plane"), "normal");
+    bool has_direction = !normal;
+    for (size_t i = 0; i < json_array_size(normal); i++)
+        has_direction = has_direction || json_number_value(json_array_get(normal, i)) != 0;
+    return status || has_direction
+               ? status
+               : drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "0 0 0 has no direction");
 }
 
 /* ---- Our format. NULL means out of memory; jansson's functions accept it as an argument. ---- */
@@ -239,101 +221,54 @@ static double stiffness_of(json_t *cloth, const char *enabled)
     return on ? number_of(cloth, "ks") : 0;
 }
 
-/* Springs that are switched off have no stiffness, but the strain limit still applies to them, as in
- * CS184. */
-static json_t *terms_of(json_t *cloth)
-{
-    return json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type", "spring.structural",
-                     "stiffness", stiffness_of(cloth, "enable_structural"), "type", "spring.shear",
-                     "stiffness", stiffness_of(cloth, "enable_shearing"), "type", "spring.bend", "stiffness",
-                     stiffness_of(cloth, "enable_bending"), "factor", 0.2, "type", "limit.strain", "limit",
-                     0.1, "over", "springs");
-}
-
-static json_t *mesh_of(json_t *cloth)
-{
-    bool vertical = number_of(cloth, "orientation") == 1;
-    return json_pack("{s:s,s:f,s:f,s:f,s:f,s:s,s:f,s:{s:[fff],s:[ffff]}}", "grid", "square", "columns",
-                     number_of(cloth, "num_width_points"), "rows", number_of(cloth, "num_height_points"),
-                     "width", number_of(cloth, "width"), "height", number_of(cloth, "height"), "orientation",
-                     vertical ? "vertical" : "horizontal", "noise", vertical ? NOISE : 0.0, "transform",
-                     "translate", 0.0, vertical ? 0.0 : 1.0, 0.0, "rotate", 1.0, 0.0, 0.0, 180.0);
-}
-
-/* E h = ks, the membrane stiffness of a sheet of these springs; no term used here needs it. */
-static json_t *material_of(json_t *cloth)
-{
-    double thickness = fmax(number_of(cloth, "thickness"), 1e-4);
-    double mass = number_of(cloth, "width") * number_of(cloth, "height") * number_of(cloth, "density");
-    return json_pack("{s:f,s:f,s:f,s:s}", "young_modulus", fmax(number_of(cloth, "ks"), 1) / thickness,
-                     "thickness", thickness, "total_mass", mass, "mass", "uniform");
-}
-
 static json_t *cloth_of(json_t *cloth)
 {
-    return json_pack("[{s:o,s:o,s:o,s:o}]", "mesh", mesh_of(cloth), "material", material_of(cloth), "terms",
-                     terms_of(cloth), "pins", pins_of(cloth));
+    const bool vertical = number_of(cloth, "orientation") == 1;
+    json_t *mesh =
+        json_pack("{s:s,s:f,s:f,s:f,s:f,s:s,s:f,s:{s:[fff],s:[ffff]}}", "grid", "square", "columns",
+                  number_of(cloth, "num_width_points"), "rows", number_of(cloth, "num_height_points"),
+                  "width", number_of(cloth, "width"), "height", number_of(cloth, "height"), "orientation",
+                  vertical ? "vertical" : "horizontal", "noise", vertical ? NOISE : 0.0, "transform",
+                  "translate", 0.0, vertical ? 0.0 : 1.0, 0.0, "rotate", 1.0, 0.0, 0.0, 180.0);
+    /* E h = ks, the membrane stiffness of a sheet of these springs; no term used here needs it. */
+    const double thickness = fmax(number_of(cloth, "thickness"), 1e-4),
+                 mass = number_of(cloth, "width") * number_of(cloth, "height") * number_of(cloth, "density");
+    json_t *material =
+        json_pack("{s:f,s:f,s:f,s:s}", "young_modulus", fmax(number_of(cloth, "ks"), 1) / thickness,
+                  "thickness", thickness, "total_mass", mass, "mass", "uniform");
+    /* Springs that are switched off have no stiffness, but the strain limit still applies to them, as in
+     * CS184. */
+    json_t *terms = json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type",
+                              "spring.structural", "stiffness", stiffness_of(cloth, "enable_structural"),
+                              "type", "spring.shear", "stiffness", stiffness_of(cloth, "enable_shearing"),
+                              "type", "spring.bend", "stiffness", stiffness_of(cloth, "enable_bending"),
+                              "factor", 0.2, "type", "limit.strain", "limit", 0.1, "over", "springs");
+    return json_pack("[{s:o,s:o,s:o,s:o}]", "mesh", mesh, "material", material, "terms", terms, "pins",
+                     pins_of(cloth));
 }
 
 static json_t *colliders_of(json_t *root)
 {
-    json_t *sphere = json_object_get(root, "sphere"), *plane = json_object_get(root, "plane");
+    static const char *const names[][3] = {{"sphere", "center", "radius"}, {"plane", "point", "normal"}};
     json_t *array = json_array();
-    if (sphere && json_array_append_new(array, json_pack("{s:s,s:O,s:O,s:O}", "type", "sphere", "center",
-                                                         json_object_get(sphere, "origin"), "radius",
-                                                         json_object_get(sphere, "radius"), "friction",
-                                                         json_object_get(sphere, "friction")))) {
-        json_decref(array);
-        array = NULL;
-    }
-    if (plane && json_array_append_new(array, json_pack("{s:s,s:O,s:O,s:O}", "type", "plane", "point",
-                                                        json_object_get(plane, "point"), "normal",
-                                                        json_object_get(plane, "normal"), "friction",
-                                                        json_object_get(plane, "friction")))) {
-        json_decref(array);
-        array = NULL;
+    for (size_t i = 0; array && i < sizeof names / sizeof *names; i++) {
+        const json_t *from = json_object_get(root, names[i][0]);
+        json_t *at = json_object_get(from, i == 0 ? "origin" : "point");
+        if (from &&
+            json_array_append_new(array, json_pack("{s:s,s:O,s:O,s:O}", "type", names[i][0], names[i][1], at,
+                                                   names[i][2], json_object_get(from, names[i][2]),
+                                                   "friction", json_object_get(from, "friction")))) {
+            json_decref(array);
+            array = NULL;
+        }
     }
     return array;
 }
 
-/* The integrator of the CS184 program, with any settings that the scene gives in our format. */
-static json_t *integrator_of(json_t *root)
-{
-    json_t *cloth = json_object_get(root, "cloth");
-    json_t *made =
-        json_pack("{s:s,s:f,s:i,s:s,s:O,s:s,s:f,s:b}", "method", "verlet", "dt", 1.0 / FRAME_RATE, "substeps",
-                  SUBSTEPS, "form", "position", "damping", json_object_get(cloth, "damping"), "contact",
-                  "cs184", "strain_limit", 0.1, "guard", 0);
-    json_t *given = json_object_get(root, "integrator");
-    if (made && given && json_object_update(made, given)) {
-        json_decref(made);
-        return NULL;
-    }
-    return made;
-}
-
-/* The CS184 program never retries a step with a smaller one: a step that diverges ends it. Other methods get
- * their default controller. */
-static const char *controller_of(json_t *root)
-{
-    const char *method = json_string_value(json_object_get(json_object_get(root, "integrator"), "method"));
-    return method && strcmp(method, "verlet") != 0 ? "halving" : "fixed";
-}
-
-static int set_ours(json_t *scene, json_t *root)
-{
-    for (int i = 0; ours[i]; i++) {
-        json_t *value = json_object_get(root, ours[i]);
-        if (value && strcmp(ours[i], "integrator") != 0 && json_object_set(scene, ours[i], value))
-            return -1;
-    }
-    return 0;
-}
-
 drape_status drape_scene_from_cs184(drape_context *ctx, json_t *root, json_t **out)
 {
+    json_t *given = json_object_get(root, "integrator"), *cloth = json_object_get(root, "cloth");
     *out = NULL;
-    json_t *given = json_object_get(root, "integrator");
     if (given && !json_is_object(given)) {
         drape_pointer at = {.length = 0};
         drape_pointer_push(&at, "integrator");
@@ -342,18 +277,30 @@ drape_status drape_scene_from_cs184(drape_context *ctx, json_t *root, json_t **o
     drape_status status = check(ctx, root);
     if (status)
         return status;
-    json_t *cloth = json_object_get(root, "cloth");
+    /* The integrator of the CS184 program, with any settings that the scene gives in our format. */
+    json_t *integrator =
+        json_pack("{s:s,s:f,s:i,s:s,s:O,s:s,s:f,s:b}", "method", "verlet", "dt", 1.0 / FRAME_RATE, "substeps",
+                  SUBSTEPS, "form", "position", "damping", json_object_get(cloth, "damping"), "contact",
+                  "cs184", "strain_limit", 0.1, "guard", 0);
+    bool failed = !integrator || (given && json_object_update(integrator, given));
+    /* The CS184 program never retries a step with a smaller one: a step that diverges ends it. Other methods
+     * get their default controller. */
+    const char *method = json_string_value(json_object_get(given, "method")),
+               *controller = method && strcmp(method, "verlet") != 0 ? "halving" : "fixed";
     json_t *scene = json_pack("{s:i,s:o,s:o,s:o,s:{s:s},s:[fff],s:f,s:i}", "drape", DRAPE_SCENE_FORM, "cloth",
-                              cloth_of(cloth), "colliders", colliders_of(root), "integrator",
-                              integrator_of(root), "controller", "type", controller_of(root), "gravity", 0.0,
-                              -9.8, 0.0, "duration", DURATION, "frame_rate", FRAME_RATE);
-    if (scene && number_of(cloth, "thickness") > 0 &&
-        json_object_set_new(scene, "self_contact",
-                            json_pack("{s:O}", "thickness", json_object_get(cloth, "thickness")))) {
-        json_decref(scene);
-        scene = NULL;
+                              cloth_of(cloth), "colliders", colliders_of(root), "integrator", integrator,
+                              "controller", "type", controller, "gravity", 0.0, -9.8, 0.0, "duration",
+                              DURATION, "frame_rate", FRAME_RATE);
+    if (number_of(cloth, "thickness") > 0)
+        failed = json_object_set_new(scene, "self_contact",
+                                     json_pack("{s:O}", "thickness", json_object_get(cloth, "thickness"))) ||
+                 failed;
+    for (int i = 0; ours[i]; i++) {
+        json_t *value = json_object_get(root, ours[i]);
+        if (value && strcmp(ours[i], "integrator") != 0)
+            failed = json_object_set(scene, ours[i], value) || failed;
     }
-    if (!scene || set_ours(scene, root)) {
+    if (failed || !scene) {
         json_decref(scene);
         return drape_fail_memory(ctx, 1);
     }

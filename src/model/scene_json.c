@@ -163,22 +163,6 @@ static drape_status read_three(reader *r, json_t *value, const char *what, doubl
                                        : refuse_as(r, value, what, "three numbers, [x, y, z]");
 }
 
-/* Reads an array of arrays of two numbers, as many as out has room for. */
-static drape_status read_pairs(reader *r, json_t *array, double *out)
-{
-    const size_t mark = r->at.length;
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < json_array_size(array); i++) {
-        json_t *one = json_array_get(array, i);
-        drape_pointer_push_index(&r->at, i);
-        status = json_array_size(one) == 2 ? read_numbers(r, one, out + 2 * i)
-                                           : refuse_as(r, one, "an element", "an array of two numbers");
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
-    }
-    return status;
-}
-
 /* Booleans become texts, so that no parameter mistakes them for numbers. */
 static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
@@ -198,27 +182,32 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
     out->vector_count = (pairs ? 2 : 1) * json_array_size(value);
     if (!numbers)
         return DRAPE_E_MEMORY;
-    return pairs ? read_pairs(r, value, numbers) : read_numbers(r, value, numbers);
-}
-
-/* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the
- * rest. */
-static bool is_writable(const drape_param *param, json_t *value)
-{
-    if (json_is_array(value))
-        return drape_param_width(param) > 1 || param->kind == DRAPE_PARAM_POINTS;
-    if (json_is_boolean(value))
-        return param->kind == DRAPE_PARAM_BOOLEAN;
-    if (json_is_string(value))
-        return param->kind != DRAPE_PARAM_BOOLEAN;
-    return json_is_number(value);
+    if (!pairs)
+        return read_numbers(r, value, numbers);
+    const size_t mark = r->at.length;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < json_array_size(value); i++) {
+        json_t *one = json_array_get(value, i);
+        drape_pointer_push_index(&r->at, i);
+        status = json_array_size(one) == 2 ? read_numbers(r, one, numbers + 2 * i)
+                                           : refuse_as(r, one, "an element", "an array of two numbers");
+        if (!status)
+            drape_pointer_cut(&r->at, mark);
+    }
+    return status;
 }
 
 static drape_status read_param(reader *r, const drape_param *param, json_t *value, drape_setting *setting,
                                double *values)
 {
     char given[80];
-    if (!is_writable(param, value)) {
+    /* drape_param_value checks the rest */
+    const bool writable = json_is_array(value)
+                              ? drape_param_width(param) > 1 || param->kind == DRAPE_PARAM_POINTS
+                          : json_is_boolean(value) ? param->kind == DRAPE_PARAM_BOOLEAN
+                          : json_is_string(value)  ? param->kind != DRAPE_PARAM_BOOLEAN
+                                                   : json_is_number(value);
+    if (!writable) {
         drape_json_describe(value, given, sizeof given);
         return drape_param_refuse(r->ctx, r->at.text, param, given);
     }
@@ -352,26 +341,11 @@ static drape_status read_track(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- Objects ---- */
 
-/* A setting, whose parameter only the compiler knows. */
-static drape_status read_member(reader *r, const char *name, json_t *value, drape_setting *out)
-{
-    size_t mark = r->at.length;
-    drape_pointer_push(&r->at, name);
-    drape_status status = json_is_object(value) || json_is_null(value)
-                              ? refuse_as(r, value, "a setting",
-                                          "a number, true, false, a string or an array of numbers or "
-                                          "pairs")
-                              : read_setting(r, name, value, out);
-    if (!status)
-        drape_pointer_cut(&r->at, mark);
-    return status;
-}
-
 /* Members that are not keys are settings in an open object, and faults in other objects. */
 static drape_status read_others(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
     drape_setting *settings = NULL;
-    size_t count = 0;
+    size_t count = 0, mark = r->at.length;
     bool open = object->open && (!object->open_with || json_object_get(value, object->open_with));
     if (open) {
         settings = drape_arena_take(r->arena, json_object_size(value), sizeof *settings);
@@ -380,13 +354,19 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
     }
     for (void *it = json_object_iter(value); it; it = json_object_iter_next(value, it)) {
         const char *name = json_object_iter_key(it);
+        json_t *member = json_object_iter_value(it);
         if (drape_scene_key_of(object, name))
             continue;
-        drape_status status = open ? read_member(r, name, json_object_iter_value(it), &settings[count])
-                                   : unknown_key(r, object, name);
+        if (!open)
+            return unknown_key(r, object, name);
+        drape_pointer_push(&r->at, name);
+        if (json_is_object(member) || json_is_null(member))
+            return refuse_as(r, member, "a setting",
+                             "a number, true, false, a string or an array of numbers or pairs");
+        const drape_status status = read_setting(r, name, member, &settings[count++]);
         if (status)
             return status;
-        count++;
+        drape_pointer_cut(&r->at, mark);
     }
     if (open) { /* an object without settings differs from a missing object */
         memcpy(def + object->settings_offset, &settings, sizeof settings);
@@ -411,10 +391,14 @@ static drape_status check_one_of(reader *r, const drape_scene_object *object, js
     return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "%s is needed; given: %s", wanted, found);
 }
 
-static drape_status read_members(reader *r, const drape_scene_object *object, json_t *value, char *def)
+/* Unknown keys are reported first: a missing key may be there under a misspelled name. */
+static drape_status read_object(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
-    size_t mark = r->at.length;
-    for (size_t i = 0; i < object->key_count; i++) {
+    drape_status status = read_others(r, object, value, def);
+    if (!status)
+        status = check_one_of(r, object, value);
+    const size_t mark = r->at.length;
+    for (size_t i = 0; !status && i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         json_t *member = json_object_get(value, key->param.name);
         if (!member && drape_param_is_required(&key->param))
@@ -422,22 +406,10 @@ static drape_status read_members(reader *r, const drape_scene_object *object, js
         if (!member)
             continue;
         drape_pointer_push(&r->at, key->param.name);
-        drape_status status = read_value(r, key, member, def);
-        if (status)
-            return status;
-        drape_pointer_cut(&r->at, mark);
+        status = read_value(r, key, member, def);
+        if (!status)
+            drape_pointer_cut(&r->at, mark);
     }
-    return DRAPE_OK;
-}
-
-/* Unknown keys are reported first: a missing key may be there under a misspelled name. */
-static drape_status read_object(reader *r, const drape_scene_object *object, json_t *value, char *def)
-{
-    drape_status status = read_others(r, object, value, def);
-    if (!status)
-        status = check_one_of(r, object, value);
-    if (!status)
-        status = read_members(r, object, value, def);
     return status;
 }
 

@@ -61,13 +61,8 @@ static void print_string(printer *p, const char *string, size_t size)
     put_text(p, "\"");
     for (size_t i = 0; i < size; i++) {
         char text[8];
-        unsigned char c = (unsigned char)string[i];
-        if (c == '"' || c == '\\')
-            snprintf(text, sizeof text, "\\%c", c);
-        else if (c < ' ')
-            snprintf(text, sizeof text, "\\u%04x", c);
-        else
-            snprintf(text, sizeof text, "%c", c);
+        const unsigned char c = (unsigned char)string[i];
+        snprintf(text, sizeof text, c < ' ' ? "\\u%04x" : c == '"' || c == '\\' ? "\\%c" : "%c", c);
         put_text(p, text);
     }
     put_text(p, "\"");
@@ -86,20 +81,13 @@ static bool is_scalar(json_t *value)
     return !json_is_array(value) && !json_is_object(value);
 }
 
-static bool has_scalars_alone(json_t *value)
-{
-    for (size_t i = 0; i < json_array_size(value); i++)
-        if (!is_scalar(json_array_get(value, i)))
-            return false;
-    return json_is_array(value);
-}
-
 /* Long lists of numbers stay on one line, as one number per line would be no more readable. */
 static bool is_one_line(const printer *p, json_t *value)
 {
-    if (is_scalar(value) || has_scalars_alone(value))
-        return true;
-    if (p->put == count)
+    bool scalars = !json_is_object(value);
+    for (size_t i = 0; i < json_array_size(value); i++)
+        scalars = scalars && is_scalar(json_array_get(value, i));
+    if (scalars || p->put == count)
         return true;
     size_t size = 0;
     printer measure = {.put = count, .user = &size};

@@ -86,44 +86,21 @@ bool drape_motion_sends_pins(const drape_motion *motion, double t, double end)
 
 /* ---- Less of it ---- */
 
-/* Whether a path is at constant speed: velocities that a host gave are its own. */
-static bool is_steady(const drape_path *path, const double move[3], double span)
-{
-    double off[3] = {-move[0], -move[1], -move[2]};
-    vec3_add_scaled(span, path->v[0], off);
-    return memcmp(path->v[0], path->v[1], sizeof path->v[0]) == 0 &&
-           vec3_norm(off) <= SAME * (vec3_norm(move) + span * vec3_norm(path->v[0]));
-}
-
 static void shorten_path(drape_path *path, const drape_sent_part *part)
 {
     const double span = path->t[1] - path->t[0];
     double move[3], rest[3];
     vec3_sub(path->x[1], path->x[0], move);
-    const bool steady = is_steady(path, move, span);
+    /* Whether a path is at constant speed: velocities that a host gave are its own. */
+    double off[3] = {-move[0], -move[1], -move[2]};
+    vec3_add_scaled(span, path->v[0], off);
+    const bool steady = memcmp(path->v[0], path->v[1], sizeof path->v[0]) == 0 &&
+                        vec3_norm(off) <= SAME * (vec3_norm(move) + span * vec3_norm(path->v[0]));
     vec3_sub(move, part->common, rest);
     for (int k = 0; k < 3; k++)
         path->x[1][k] = path->x[0][k] + part->left[k] + part->share * rest[k];
     for (int k = 0; steady && k < 3; k++)
         path->v[0][k] = path->v[1][k] = (path->x[1][k] - path->x[0][k]) / span;
-}
-
-static void shorten_turn(drape_turn_path *turn, double share)
-{
-    for (int k = 0; k < 3; k++) {
-        turn->turn[k] *= share;
-        turn->rate[0][k] *= share;
-        turn->rate[1][k] *= share;
-    }
-}
-
-static void shorten_deformation(drape_deformation *d, double share)
-{
-    for (size_t i = 0; i < 3 * (size_t)d->frames->node_count; i++) {
-        d->x[1][i] = d->x[0][i] + share * (d->x[1][i] - d->x[0][i]);
-        d->v[0][i] *= share;
-        d->v[1][i] *= share;
-    }
 }
 
 void drape_motion_shorten(drape_motion *motion, const drape_sent_part *part)
@@ -136,9 +113,18 @@ void drape_motion_shorten(drape_motion *motion, const drape_sent_part *part)
         drape_deformation *points = &motion->deformation[c];
         if (is_sent(path->given, path->t, part->t, part->end)) {
             shorten_path(path, part);
-            shorten_turn(&motion->collider_turn[c], part->share);
+            for (int k = 0; k < 3; k++) {
+                motion->collider_turn[c].turn[k] *= part->share;
+                motion->collider_turn[c].rate[0][k] *= part->share;
+                motion->collider_turn[c].rate[1][k] *= part->share;
+            }
         }
-        if (is_sent(points->given, points->t, part->t, part->end))
-            shorten_deformation(points, part->share);
+        if (!is_sent(points->given, points->t, part->t, part->end))
+            continue;
+        for (size_t i = 0; i < 3 * (size_t)points->frames->node_count; i++) {
+            points->x[1][i] = points->x[0][i] + part->share * (points->x[1][i] - points->x[0][i]);
+            points->v[0][i] *= part->share;
+            points->v[1][i] *= part->share;
+        }
     }
 }
