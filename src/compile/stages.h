@@ -8,6 +8,7 @@
 
 /* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "/seams/0" and "name" are "/seams/0/name". */
 /* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "name" of "/seams/0" at "/seams/0/name". */
+/* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "/seams/0/name" for "name". */
 drape_status drape_compile_refuse(drape_context *ctx, const char *pointer, const char *key,
                                   const char *format, ...) DRAPE_PRINTF(4, 5);
 

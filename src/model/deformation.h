@@ -34,7 +34,7 @@ void drape_deformation_corners(const drape_deformation *d, const int32_t *triang
 void drape_deformation_corner_velocities(const drape_deformation *d, const int32_t *triangle, double t,
                                          double within, double v[9]);
 
-/* `count` numbers of a cubic with the values x and the rates v at the times t[0] < t[1], and their rates: Hermite
+/* `count` numbers of a cubic with the values x and the rates v at the times t0 < t1, and their rates: Hermite
  * interpolation at s = (t - t0)/(t1 - t0). At rest before and after; `within` as above. */
 void drape_cubic_values(const double times[2], const double *const x[2], const double *const v[2], double t,
                         size_t count, double *out);

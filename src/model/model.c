@@ -163,11 +163,9 @@ int drape_model_couplings(const drape_model *model, const bool *without, drape_c
     return count;
 }
 
-/*
- * Principal strains of triangles. Let D = (x1 - x0, x2 - x0) be the edge vectors, and R the same at rest, in a
- * frame of the triangle whose first axis is its first edge. The deformation gradient is F = D R^-1 (3 x 2). The
- * principal stretches are the square roots of the eigenvalues of F'F, a symmetric 2 x 2 matrix.
- */
+/* Principal strains of triangles. Let D = (x1 - x0, x2 - x0) be the edge vectors, and R the same at rest, in
+ * a frame of the triangle whose first axis is its first edge. The deformation gradient is F = D R^-1 (3 x 2).
+ * The principal stretches are the square roots of the eigenvalues of F'F, a symmetric 2 x 2 matrix. */
 void drape_model_strain(const drape_model *model, const double *x, double *strain)
 {
     if (!model || !x || !strain)

@@ -47,7 +47,7 @@ void drape_render_values(const drape_model *model, const double *values, int wid
         if (!to->bound)
             memcpy(out, values + w * (size_t)model->cloths[c].first_node, w * count * sizeof *out);
         for (size_t i = 0; to->bound && i < count; i++) {
-            /* of a place within the triangle: extrapolation would give a speed or an energy that is nowhere */
+            /* within the triangle: extrapolation would give a speed or an energy that is nowhere */
             double weights[3], sum = 0;
             for (int a = 0; a < 3; a++)
                 sum += weights[a] = fmax(to->bound[i].weights[a], 0);

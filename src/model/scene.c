@@ -374,7 +374,7 @@ static drape_status parse_value(drape_scene *scene, const char *text, json_t **v
     return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
 }
 
-/* What the last key of a pointer names in its container; *child stays NULL if that is a new member, or "-". */
+/* What the last key of a pointer names in its container; *child stays NULL for a new member, and for "-". */
 static drape_status find_child(drape_scene *scene, const char *pointer, const landing *at, json_t **child)
 {
     const bool array = json_is_array(at->container);
