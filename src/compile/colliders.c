@@ -28,8 +28,8 @@ static drape_status set_pivot(drape_model *model, const char *pointer, const dou
         }
         to->pivot[k] = is_given ? given[k] : (low + high) / 2;
         if (!(fabs(to->pivot[k]) <= DRAPE_MOST))
-            return drape_compile_refuse(model->ctx, pointer, "pivot", "%g is not allowed; it is within %g m",
-                                        to->pivot[k], DRAPE_MOST);
+            return drape_fail_below(model->ctx, pointer, "pivot", "%g is not allowed; it is within %g m",
+                                    to->pivot[k], DRAPE_MOST);
     }
     for (int32_t i = 0; i < shape->point_count; i++) {
         double from[3];

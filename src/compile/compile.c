@@ -9,21 +9,8 @@
 #include "model/scene.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-drape_status drape_compile_refuse(drape_context *ctx, const char *pointer, const char *key,
-                                  const char *format, ...)
-{
-    char at[sizeof ctx->pointer], text[512];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    snprintf(at, sizeof at, "%s/%s", pointer, key);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
 
 drape_status drape_compile_name(drape_model *model, const char *pointer, const char *kind, const char *many,
                                 const char *given, int32_t index, char **name, size_t size)
@@ -33,8 +20,8 @@ drape_status drape_compile_name(drape_model *model, const char *pointer, const c
     const char *wanted = given ? given : own;
     for (size_t i = 1; i <= (size_t)index; i++)
         if (strcmp(*(char **)(void *)((char *)name - i * size), wanted) == 0)
-            return drape_compile_refuse(model->ctx, pointer, "name", "two %s have the name \"%.60s\"", many,
-                                        wanted);
+            return drape_fail_below(model->ctx, pointer, "name", "two %s have the name \"%.60s\"", many,
+                                    wanted);
     *name = drape_arena_text(&model->arena, wanted);
     return drape_arena_status(&model->arena);
 }

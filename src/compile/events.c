@@ -56,9 +56,9 @@ static drape_status find_pins(const place *p, const char *name, drape_model_even
         if (concerns(&m->pins[k], to, name))
             to->pin[count++] = k;
     if (name && count == 0)
-        return drape_compile_refuse(p->ctx, p->pointer, "pins", "there are no pins \"%.60s\" in %s%.60s",
-                                    name, to->cloth < 0 ? "any cloth" : "cloth ",
-                                    to->cloth < 0 ? "" : m->cloths[to->cloth].name);
+        return drape_fail_below(p->ctx, p->pointer, "pins", "there are no pins \"%.60s\" in %s%.60s", name,
+                                to->cloth < 0 ? "any cloth" : "cloth ",
+                                to->cloth < 0 ? "" : m->cloths[to->cloth].name);
     return list_nodes(p, to);
 }
 
@@ -83,13 +83,13 @@ static drape_status check_release(const place *p, const drape_model_event *to)
     for (int32_t k = 0; k < to->pin_count; k++) {
         const drape_pin *pin = &p->model->pins[to->pin[k]];
         if (pin->clamps || pin->slides)
-            return drape_compile_refuse(
-                p->ctx, p->pointer, "action", "the pins \"%.60s\" %s; such pins cannot be released",
-                pin->name, pin->clamps ? "clamp edges" : "hold their nodes in some directions only");
+            return drape_fail_below(p->ctx, p->pointer, "action",
+                                    "the pins \"%.60s\" %s; such pins cannot be released", pin->name,
+                                    pin->clamps ? "clamp edges" : "hold their nodes in some directions only");
     }
     return to->pinned_count > 0
                ? DRAPE_OK
-               : drape_compile_refuse(p->ctx, p->pointer, "action", "there are no pins to release");
+               : drape_fail_below(p->ctx, p->pointer, "action", "there are no pins to release");
 }
 
 /* All but the event function. */
@@ -107,7 +107,7 @@ static drape_status resolve(const place *p, const drape_event_def *def, drape_mo
         if (strcmp(p->model->cloths[c].name, def->cloth) == 0)
             to->cloth = c;
     if (!status && def->cloth && to->cloth < 0)
-        status = drape_compile_refuse(p->ctx, p->pointer, "cloth", "there is no cloth \"%.60s\"", def->cloth);
+        status = drape_fail_below(p->ctx, p->pointer, "cloth", "there is no cloth \"%.60s\"", def->cloth);
     if (!status)
         status = find_pins(p, def->pins, to);
     return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
@@ -120,8 +120,8 @@ static drape_status check_name(const place *p, const char *name)
     for (const char *c = name; c && *c; c++)
         good = good && *c != ';' && *c != '@' && (unsigned char)*c >= ' ' && *c != 0x7f;
     return good ? DRAPE_OK
-                : drape_compile_refuse(p->ctx, p->pointer, "name",
-                                       "the name of an event has no \";\", \"@\" or control character");
+                : drape_fail_below(p->ctx, p->pointer, "name",
+                                   "the name of an event has no \";\", \"@\" or control character");
 }
 
 /* ---- Of a scene ---- */
@@ -150,7 +150,7 @@ static drape_status compile_event(drape_model *model, size_t i, const drape_even
         status = drape_params_resolve(p.ctx, pointer, &to->ops->entry, def->entry.settings,
                                       def->entry.setting_count, to->values);
     if (!status && to->ops->needs_pins && to->pinned_count == 0)
-        status = drape_compile_refuse(p.ctx, pointer, "type", "the event is about pins, and there are none");
+        status = drape_fail_below(p.ctx, pointer, "type", "the event is about pins, and there are none");
     return status || !to->ops->check ? status : to->ops->check(p.ctx, pointer, model, to);
 }
 

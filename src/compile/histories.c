@@ -22,20 +22,20 @@ static drape_status check(drape_model *model, const char *pointer, const drape_s
         snprintf(time, sizeof time, "times/%zu", k);
         snprintf(value, sizeof value, "values/%zu", k);
         if (!(fabs(def->times[k]) <= DRAPE_MOST))
-            return drape_compile_refuse(model->ctx, pointer, time, "a time is finite and within 1e9 s");
+            return drape_fail_below(model->ctx, pointer, time, "a time is finite and within 1e9 s");
         if (!(fabs(def->values[k]) <= DRAPE_MOST))
-            return drape_compile_refuse(model->ctx, pointer, value, "a factor is finite and within 1e9");
+            return drape_fail_below(model->ctx, pointer, value, "a factor is finite and within 1e9");
         if (k > 0 && !(def->times[k] > def->times[k - 1]))
-            return drape_compile_refuse(model->ctx, pointer, time, "times must increase from key to key");
+            return drape_fail_below(model->ctx, pointer, time, "times must increase from key to key");
         if (k > 0 &&
             !(fabs(def->values[k] - def->values[k - 1]) <= MAX_SLOPE * (def->times[k] - def->times[k - 1])))
-            return drape_compile_refuse(model->ctx, pointer, time,
-                                        "the factor changes by more than 1e30 per second");
+            return drape_fail_below(model->ctx, pointer, time,
+                                    "the factor changes by more than 1e30 per second");
     }
     for (size_t k = 0; k < i; k++)
         if (strcmp(scene->histories[k].name, def->name) == 0)
-            return drape_compile_refuse(model->ctx, pointer, "name", "two histories have the name \"%.60s\"",
-                                        def->name);
+            return drape_fail_below(model->ctx, pointer, "name", "two histories have the name \"%.60s\"",
+                                    def->name);
     return DRAPE_OK;
 }
 
@@ -131,8 +131,8 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
     if (drape_term_is_timed(term))
         return refuse_timed(model, at, term);
     if (rise < LEAST_RAMP)
-        return drape_compile_refuse(model->ctx, pointer, "ramp",
-                                    "%g s is too short; ramp is 0 or at least %g s", rise, LEAST_RAMP);
+        return drape_fail_below(model->ctx, pointer, "ramp", "%g s is too short; ramp is 0 or at least %g s",
+                                rise, LEAST_RAMP);
     const double times[] = {0, rise}, values[] = {0, 1};
     drape_status status = add(model, "", 2, times, values, true);
     if (!status) {

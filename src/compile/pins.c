@@ -178,9 +178,8 @@ static drape_status take_node(void *user, const char *key, int32_t local)
         return status;
     }
     if (pin->model->pinned[node] && !tracks_agree(pin->model, pin->track_of_node[node], pin->track))
-        return drape_compile_refuse(pin->model->ctx, pin->pointer, key,
-                                    "node %d is pinned twice, along different tracks or colliders",
-                                    (int)local);
+        return drape_fail_below(pin->model->ctx, pin->pointer, key,
+                                "node %d is pinned twice, along different tracks or colliders", (int)local);
     if (!pin->model->pinned[node])
         pin->track_of_node[node] = pin->track;
     pin->model->pinned[node] = 1;
@@ -213,14 +212,14 @@ static drape_status find_directions(pin_place *pin)
     drape_context *ctx = pin->model->ctx;
     pin->count = normal ? 1 : line ? 2 : 0;
     if (normal && line)
-        return drape_compile_refuse(ctx, pin->pointer, "axis", "a pin has a normal or an axis, not both");
+        return drape_fail_below(ctx, pin->pointer, "axis", "a pin has a normal or an axis, not both");
     if (pin->count > 0 && ((def->turn_count > 0 && !def->clamp) || def->attach))
-        return drape_compile_refuse(
+        return drape_fail_below(
             ctx, pin->pointer, normal ? "normal" : "axis",
             "a pin that holds its nodes in some directions only may have a track, and turns with clamp, "
             "but no attach");
     if ((normal && vec3_norm(n) == 0) || (line && vec3_norm(axis) == 0))
-        return drape_compile_refuse(ctx, pin->pointer, normal ? "normal" : "axis", "0 0 0 has no direction");
+        return drape_fail_below(ctx, pin->pointer, normal ? "normal" : "axis", "0 0 0 has no direction");
     if (!line)
         return DRAPE_OK;
     int least = 0;
@@ -240,14 +239,14 @@ static drape_status keep_track(pin_place *pin)
     drape_context *ctx = model->ctx;
     pin->track = -1;
     if (pin->def->turn_count == 0 && !isnan(pin->def->pivot[0]))
-        return drape_compile_refuse(ctx, pin->pointer, "pivot",
-                                    "without turns there is nothing that turns about it");
+        return drape_fail_below(ctx, pin->pointer, "pivot",
+                                "without turns there is nothing that turns about it");
     if (pin->def->attach && pin->def->key_count > 0)
-        return drape_compile_refuse(ctx, pin->pointer, "attach",
-                                    "a pin is carried by a collider or moves along a track, not both");
+        return drape_fail_below(ctx, pin->pointer, "attach",
+                                "a pin is carried by a collider or moves along a track, not both");
     if (pin->def->turn_count > 0 && pin->def->attach)
-        return drape_compile_refuse(ctx, pin->pointer, "turns",
-                                    "a pin is carried by a collider or turns about a pivot, not both");
+        return drape_fail_below(ctx, pin->pointer, "turns",
+                                "a pin is carried by a collider or turns about a pivot, not both");
     if (pin->def->attach)
         pin->track = model->track_count++; /* without keys: drape_compile_rides has its motion */
     if (pin->def->key_count == 0 && pin->def->turn_count == 0)

@@ -11,27 +11,26 @@ static drape_status find_carrier(const drape_model *model, const char *pointer, 
                                  int32_t *number)
 {
     if (!def->attach)
-        return drape_compile_refuse(
+        return drape_fail_below(
             model->ctx, pointer, "triangle",
             "a triangle is one of a collider, which \"attach\" names; there is no attach");
     for (*number = 0; *number < model->collider_count; ++*number)
         if (strcmp(model->colliders[*number].name, def->attach) == 0)
             break;
     if (*number == model->collider_count)
-        return drape_compile_refuse(model->ctx, pointer, "attach", "there is no collider \"%.60s\"",
-                                    def->attach);
+        return drape_fail_below(model->ctx, pointer, "attach", "there is no collider \"%.60s\"", def->attach);
     const drape_collider *collider = &model->colliders[*number];
     const bool deforms = collider->frames.frame_count > 0;
     if (def->triangle < 0 || (deforms && def->triangle < collider->shape.triangle_count))
         return DRAPE_OK;
     if (!deforms)
-        return drape_compile_refuse(
+        return drape_fail_below(
             model->ctx, pointer, "triangle",
             "%d is not allowed: \"%.60s\" is a %s, which is rigid and carries pins as a whole",
             (int)def->triangle, collider->name, collider->ops->entry.name);
-    return drape_compile_refuse(model->ctx, pointer, "triangle",
-                                "there is no triangle %d; \"%.60s\" has the triangles 0 to %d",
-                                (int)def->triangle, collider->name, (int)collider->shape.triangle_count - 1);
+    return drape_fail_below(model->ctx, pointer, "triangle",
+                            "there is no triangle %d; \"%.60s\" has the triangles 0 to %d",
+                            (int)def->triangle, collider->name, (int)collider->shape.triangle_count - 1);
 }
 
 /* The nodes of a pin begin where the cloth starts. */

@@ -21,8 +21,7 @@ static drape_status take_node(void *user, const char *key, int32_t local)
 {
     side *s = user;
     if (s->taken[local])
-        return drape_compile_refuse(s->model->ctx, s->pointer, key, "node %d is in the seam twice",
-                                    (int)local);
+        return drape_fail_below(s->model->ctx, s->pointer, key, "node %d is in the seam twice", (int)local);
     s->taken[local] = 1;
     s->node[s->count++] = local;
     return DRAPE_OK;
@@ -66,8 +65,8 @@ static drape_status list_side(side *s, drape_arena *scratch)
         if (strcmp(s->model->cloths[s->cloth].name, def->cloth) == 0)
             break;
     if (s->cloth == s->model->cloth_count)
-        return drape_compile_refuse(s->model->ctx, s->pointer, "cloth", "there is no cloth \"%.60s\"",
-                                    def->cloth);
+        return drape_fail_below(s->model->ctx, s->pointer, "cloth", "there is no cloth \"%.60s\"",
+                                def->cloth);
     const drape_mesh *mesh = &s->model->cloths[s->cloth].mesh;
     s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
     s->taken = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->taken);

@@ -49,8 +49,7 @@ static drape_status take_box(const drape_selection *s)
     const double *low = s->box_min, *high = s->box_max;
     for (int k = 0; k < 3; k++)
         if (!(low[k] <= high[k]))
-            return drape_compile_refuse(s->ctx, s->pointer, "box",
-                                        "min must not be above max in any coordinate");
+            return drape_fail_below(s->ctx, s->pointer, "box", "min must not be above max in any coordinate");
     drape_status status = drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count);
     int32_t taken = 0;
     for (int32_t i = 0; !status && i < s->mesh->node_count; i++) {
@@ -66,7 +65,7 @@ static drape_status take_box(const drape_selection *s)
             status = s->take(s->user, "box", i);
     }
     if (!status && taken == 0)
-        status = drape_compile_refuse(s->ctx, s->pointer, "box", "no node lies in the box");
+        status = drape_fail_below(s->ctx, s->pointer, "box", "no node lies in the box");
     return status;
 }
 
@@ -81,7 +80,7 @@ drape_status drape_select_nodes(const drape_selection *s)
         return drape_fail_at(s->ctx, DRAPE_E_ARGUMENT, s->pointer, "%s is needed", wanted);
     }
     if (on_grid && s->mesh->rows == 0)
-        return drape_compile_refuse(
+        return drape_fail_below(
             s->ctx, s->pointer, on_grid,
             "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
     for (size_t i = 0; !status && s->nodes && i < s->node_count; i++) {
@@ -90,9 +89,9 @@ drape_status drape_select_nodes(const drape_selection *s)
         snprintf(key, sizeof key, "nodes/%zu", i);
         status = node >= 0 && node < count
                      ? s->take(s->user, key, node)
-                     : drape_compile_refuse(s->ctx, s->pointer, key,
-                                            "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
-                                            (int)count - 1);
+                     : drape_fail_below(s->ctx, s->pointer, key,
+                                        "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
+                                        (int)count - 1);
     }
     if (s->nodes)
         return status;
@@ -103,9 +102,8 @@ drape_status drape_select_nodes(const drape_selection *s)
     if (s->has_box)
         return take_box(s);
     if (s->row >= s->mesh->rows)
-        return drape_compile_refuse(s->ctx, s->pointer, "row",
-                                    "row %d is not in the mesh; its rows are 0 to %d", (int)s->row,
-                                    (int)s->mesh->rows - 1);
+        return drape_fail_below(s->ctx, s->pointer, "row", "row %d is not in the mesh; its rows are 0 to %d",
+                                (int)s->row, (int)s->mesh->rows - 1);
     return take_range(s, "row", s->row, s->row, 0, s->mesh->columns - 1);
 }
 

@@ -76,17 +76,17 @@ static drape_status fold_frame(drape_model *model, const char *pointer, const dr
     double *e = frame[0], *d = frame[1];
     const double length = vec3_norm(def->axis);
     if (!(length > 0 && isfinite(length)))
-        return drape_compile_refuse(model->ctx, pointer, "axis", "%g %g %g has no direction", def->axis[0],
-                                    def->axis[1], def->axis[2]);
+        return drape_fail_below(model->ctx, pointer, "axis", "%g %g %g has no direction", def->axis[0],
+                                def->axis[1], def->axis[2]);
     for (int k = 0; k < 3; k++)
         e[k] = def->axis[k] / length;
     memcpy(d, def->side, 3 * sizeof *d);
     vec3_add_scaled(-vec3_dot(e, d), e, d);
     const double across = vec3_norm(d);
     if (!(across > 1e-9 * vec3_norm(def->side) && isfinite(across)))
-        return drape_compile_refuse(model->ctx, pointer, "side",
-                                    "%g %g %g does not point away from the axis, %g %g %g", def->side[0],
-                                    def->side[1], def->side[2], def->axis[0], def->axis[1], def->axis[2]);
+        return drape_fail_below(model->ctx, pointer, "side",
+                                "%g %g %g does not point away from the axis, %g %g %g", def->side[0],
+                                def->side[1], def->side[2], def->axis[0], def->axis[1], def->axis[2]);
     for (int k = 0; k < 3; k++)
         d[k] /= across;
     vec3_cross(e, d, frame[2]);

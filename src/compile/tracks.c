@@ -21,11 +21,10 @@ drape_status drape_compile_track(drape_model *model, const char *pointer, const 
             finite = finite && fabs(keys[k].displacement[i]) <= DRAPE_MOST;
         snprintf(key, sizeof key, "track/%zu", k);
         if (!finite)
-            return drape_compile_refuse(
-                model->ctx, pointer, key,
-                "time and displacement must be finite, the displacement within 1e9 m");
+            return drape_fail_below(model->ctx, pointer, key,
+                                    "time and displacement must be finite, the displacement within 1e9 m");
         if (k > 0 && !(keys[k].time > keys[k - 1].time))
-            return drape_compile_refuse(model->ctx, pointer, key, "times must increase from key to key");
+            return drape_fail_below(model->ctx, pointer, key, "times must increase from key to key");
     }
     track->keys = drape_arena_take(&model->arena, key_count, sizeof *track->keys);
     if (!track->keys)
@@ -104,12 +103,12 @@ drape_status drape_compile_turns(drape_model *model, const char *pointer, const 
             finite = finite && fabs(rotate[i]) <= DRAPE_MOST && fabs(q[i]) <= DRAPE_MOST;
         snprintf(key, sizeof key, "turns/%zu", k);
         if (!finite)
-            return drape_compile_refuse(model->ctx, pointer, key,
-                                        "time, rotate and quaternion must be finite, and within 1e9");
+            return drape_fail_below(model->ctx, pointer, key,
+                                    "time, rotate and quaternion must be finite, and within 1e9");
         if (k > 0 && !(keys[k].time > keys[k - 1].time))
-            return drape_compile_refuse(model->ctx, pointer, key, "times must increase from key to key");
+            return drape_fail_below(model->ctx, pointer, key, "times must increase from key to key");
         if (is_zero(q, 4) && rotate[3] != 0 && is_zero(rotate, 3))
-            return drape_compile_refuse(model->ctx, pointer, key, "the axis of a rotation must not be 0 0 0");
+            return drape_fail_below(model->ctx, pointer, key, "the axis of a rotation must not be 0 0 0");
     }
     turns->keys = drape_arena_take(&model->arena, key_count, sizeof *turns->keys);
     if (!turns->keys)
@@ -130,8 +129,8 @@ drape_status drape_compile_turns(drape_model *model, const char *pointer, const 
     for (size_t k = 0; k + 1 < key_count; k++)
         turn_between(&keys[k], &keys[k + 1], turns->keys[k + 1].rotation, &turns->keys[k]);
     if (drape_turns_fastest(turns) > DRAPE_MAX_SPIN)
-        return drape_compile_refuse(model->ctx, pointer, "turns",
-                                    "%.6g rad/s is not allowed; colliders and pins turn by at most %g rad/s",
-                                    drape_turns_fastest(turns), DRAPE_MAX_SPIN);
+        return drape_fail_below(model->ctx, pointer, "turns",
+                                "%.6g rad/s is not allowed; colliders and pins turn by at most %g rad/s",
+                                drape_turns_fastest(turns), DRAPE_MAX_SPIN);
     return DRAPE_OK;
 }

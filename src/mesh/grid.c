@@ -22,11 +22,9 @@ drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int6
 {
     if (columns * rows <= DRAPE_MAX_NODES)
         return DRAPE_OK;
-    char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s/columns", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                         "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
-                         (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
+    return drape_fail_below(
+        ctx, pointer, "columns", "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
+        (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
 }
 
 double drape_grid_random(uint64_t *seed)

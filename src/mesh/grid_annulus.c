@@ -8,7 +8,6 @@
  *     x = R cos a,  z = -R sin a
  */
 #include <math.h>
-#include <stdio.h>
 
 #include "base/elementary.h"
 #include "mesh/grid.h"
@@ -27,12 +26,10 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 {
     const int32_t columns = (int32_t)values[SPOKES], rows = (int32_t)values[CIRCLES];
     const drape_mesh_source source = {.pointer = pointer};
-    char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s/outer_radius", pointer);
     drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
     if (!status && !(values[OUTER] > values[INNER]))
-        status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g m; it is larger than inner_radius, %g m",
-                               values[OUTER], values[INNER]);
+        status = drape_fail_below(ctx, pointer, "outer_radius", "%g m; it is larger than inner_radius, %g m",
+                                  values[OUTER], values[INNER]);
     if (!status)
         status = drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
                                      2 * (size_t)(rows - 1) * (size_t)columns, mesh);

@@ -9,7 +9,6 @@
  * Triangles are counterclockwise as seen from outside or, if the bottom circle is the larger one, from above.
  */
 #include <math.h>
-#include <stdio.h>
 
 #include "base/elementary.h"
 #include "base/pi.h"
@@ -35,19 +34,15 @@ static const drape_param params[PARAM_COUNT] = {
 
 static drape_status check_meridian(drape_context *ctx, const char *pointer, const double *values)
 {
-    char place[sizeof ctx->pointer];
     const double chord = drape_hypot(values[BOTTOM] - values[TOP], values[HEIGHT]);
-    if (!(chord > 0)) {
-        snprintf(place, sizeof place, "%s/height", pointer);
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "0 m, and both circles have the radius %g m",
-                             values[TOP]);
-    }
+    if (!(chord > 0))
+        return drape_fail_below(ctx, pointer, "height", "0 m, and both circles have the radius %g m",
+                                values[TOP]);
     if (values[ARC] == 0 || values[ARC] >= chord / 2 * (1 - 1e-12))
         return DRAPE_OK;
-    snprintf(place, sizeof place, "%s/arc_radius", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                         "%g m; it is at least half the distance of the circles, %g m", values[ARC],
-                         chord / 2);
+    return drape_fail_below(ctx, pointer, "arc_radius",
+                            "%g m; it is at least half the distance of the circles, %g m", values[ARC],
+                            chord / 2);
 }
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)

@@ -125,12 +125,12 @@ drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const 
     if (!format)
         return DRAPE_E_ARGUMENT;
     if (format->has_triangles && def->mesh)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
-                             "%s has its triangles itself: a mesh beside it is not used", def->file);
+        return drape_fail_below(ctx, pointer, "mesh",
+                                "%s has its triangles itself: a mesh beside it is not used", def->file);
     if (!format->has_triangles && !def->mesh)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at_mesh,
-                             "%s has positions only: the OBJ or PLY file of its triangles is needed",
-                             def->file);
+        return drape_fail_below(ctx, pointer, "mesh",
+                                "%s has positions only: the OBJ or PLY file of its triangles is needed",
+                                def->file);
     const locale_t old = drape_locale_enter();
     drape_status status =
         format->has_triangles ? DRAPE_OK : drape_mesh_read(ctx, at_mesh, folder, def->mesh, mesh);

@@ -6,32 +6,28 @@
 #include "mesh/mesh.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #include "base/vec3.h"
 
 drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer, const double scale[3],
                                         const double rotate[4], const double translate[3])
 {
-    char place[sizeof ctx->pointer];
-    if (!drape_all_finite(scale, 3) || scale[0] <= 0 || scale[1] <= 0 || scale[2] <= 0) {
-        snprintf(place, sizeof place, "%s/transform/scale", pointer);
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                             "%g %g %g; each must be finite and > 0, a mirror "
-                             "image would turn the mesh inside out",
-                             scale[0], scale[1], scale[2]);
-    }
-    snprintf(place, sizeof place, "%s/transform/rotate", pointer);
+    if (!drape_all_finite(scale, 3) || scale[0] <= 0 || scale[1] <= 0 || scale[2] <= 0)
+        return drape_fail_below(ctx, pointer, "transform/scale",
+                                "%g %g %g; each must be finite and > 0, a mirror image would turn the mesh "
+                                "inside out",
+                                scale[0], scale[1], scale[2]);
     if (!drape_all_finite(rotate, 4))
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g %g; axis and angle must be finite",
-                             rotate[0], rotate[1], rotate[2], rotate[3]);
+        return drape_fail_below(ctx, pointer, "transform/rotate",
+                                "%g %g %g %g; axis and angle must be finite", rotate[0], rotate[1], rotate[2],
+                                rotate[3]);
     if (rotate[3] != 0 && rotate[0] == 0 && rotate[1] == 0 && rotate[2] == 0)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                             "the axis of a rotation by %g degrees is 0 0 0; it must not be zero", rotate[3]);
-    snprintf(place, sizeof place, "%s/transform/translate", pointer);
+        return drape_fail_below(ctx, pointer, "transform/rotate",
+                                "the axis of a rotation by %g degrees is 0 0 0; it must not be zero",
+                                rotate[3]);
     if (!drape_all_finite(translate, 3))
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g; each must be finite", translate[0],
-                             translate[1], translate[2]);
+        return drape_fail_below(ctx, pointer, "transform/translate", "%g %g %g; each must be finite",
+                                translate[0], translate[1], translate[2]);
     return DRAPE_OK;
 }
 
