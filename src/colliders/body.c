@@ -32,23 +32,6 @@ static double distance(const drape_collider *c, const double *x, double *normal)
     return c->ops->distance(c->values, &c->shape, x, normal, NULL);
 }
 
-/* The extent along each axis: from very far away the surface is nearly a plane across that axis. */
-static void find_box(const drape_collider *c, const double *center, double reach, drape_body *body)
-{
-    for (int k = 0; k < 3; k++)
-        for (int sign = -1; sign <= 1; sign += 2) {
-            double x[3] = {center[0], center[1], center[2]};
-            x[k] += sign * FAR * reach;
-            double extent = FAR * reach - distance(c, x, NULL);
-            body->endless |= extent > FAR * reach / 2;
-            *(sign > 0 ? &body->high[k] : &body->low[k]) = center[k] + sign * extent;
-        }
-    for (int k = 0; body->endless && k < 3; k++) {
-        body->low[k] = center[k] - ENDLESS * reach;
-        body->high[k] = center[k] + ENDLESS * reach;
-    }
-}
-
 /* ---- The grid ---- */
 
 static size_t corner_number(const grid *g, int i, int j, int k)
@@ -90,45 +73,11 @@ static drape_status make_grid(const drape_body *body, grid *g)
 
 /* ---- A point in each cell that the surface passes through ---- */
 
-/* Finds the point where the surface cuts the segment from a to b, by bisection to half a unit in the last
- * place of the vertices, which are floats. */
-static void cut(const drape_collider *c, const double *a, const double *b, double *x)
-{
-    double low = 0, high = 1, at_a = distance(c, a, NULL);
-    while (high - low > FLT_EPSILON / 2) {
-        double s = (low + high) / 2;
-        for (int k = 0; k < 3; k++)
-            x[k] = a[k] + s * (b[k] - a[k]);
-        if ((distance(c, x, NULL) < 0) == (at_a < 0))
-            low = s;
-        else
-            high = s;
-    }
-}
-
-/* Solves a x = b for a symmetric positive definite 3 x 3 matrix, by Cramer's rule. */
-static void solve3(double a[3][3], const double *b, double *x)
-{
-    double cofactor[3][3], determinant = 0;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int r = (i + 1) % 3, s = (i + 2) % 3, t = (j + 1) % 3, u = (j + 2) % 3;
-            cofactor[i][j] = a[r][t] * a[s][u] - a[r][u] * a[s][t];
-        }
-    for (int j = 0; j < 3; j++)
-        determinant += a[0][j] * cofactor[0][j];
-    for (int i = 0; i < 3; i++) {
-        x[i] = 0;
-        for (int j = 0; j < 3; j++)
-            x[i] += cofactor[j][i] * b[j] / determinant;
-    }
-}
-
 /* The point with the least squared distances from the planes at the cuts, regularized towards the mean of the
  * cuts. */
 static void fit_point(const double (*cuts)[3], const double (*normals)[3], int count, double *x)
 {
-    double mean[3] = {0}, a[3][3] = {{0}}, b[3] = {0}, move[3];
+    double mean[3] = {0}, a[3][3] = {{0}}, b[3] = {0};
     for (int i = 0; i < count; i++)
         vec3_add_scaled(1.0 / count, cuts[i], mean);
     for (int k = 0; k < 3; k++)
@@ -143,9 +92,21 @@ static void fit_point(const double (*cuts)[3], const double (*normals)[3], int c
                 a[r][s] += normals[i][r] * normals[i][s];
         }
     }
-    solve3(a, b, move);
-    for (int k = 0; k < 3; k++)
-        x[k] = mean[k] + move[k];
+    /* Cramer's rule for a move = b, with a symmetric positive definite. */
+    double cofactor[3][3], determinant = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int r = (i + 1) % 3, s = (i + 2) % 3, t = (j + 1) % 3, u = (j + 2) % 3;
+            cofactor[i][j] = a[r][t] * a[s][u] - a[r][u] * a[s][t];
+        }
+    for (int j = 0; j < 3; j++)
+        determinant += a[0][j] * cofactor[0][j];
+    for (int i = 0; i < 3; i++) {
+        double move = 0;
+        for (int j = 0; j < 3; j++)
+            move += cofactor[j][i] * b[j] / determinant;
+        x[i] = mean[i] + move;
+    }
 }
 
 /* Adds the tangent plane at the surface point nearest to each corner of the cell, if that point is in the
@@ -186,7 +147,15 @@ static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*no
             continue;
         corner_at(g, from[0], from[1], from[2], a);
         corner_at(g, to[0], to[1], to[2], b);
-        cut(g->collider, a, b, cuts[count]);
+        /* by bisection to half a unit in the last place of the vertices, which are floats */
+        double low = 0, high = 1, *x = cuts[count];
+        const bool inside = distance(g->collider, a, NULL) < 0;
+        while (high - low > FLT_EPSILON / 2) {
+            const double s = (low + high) / 2;
+            for (int k = 0; k < 3; k++)
+                x[k] = a[k] + s * (b[k] - a[k]);
+            *((distance(g->collider, x, NULL) < 0) == inside ? &low : &high) = s;
+        }
         distance(g->collider, cuts[count], normals[count]);
         count++;
     }
@@ -295,10 +264,27 @@ static drape_status contour(drape_arena *arena, const drape_collider *collider, 
 
 /* ---- Colliders that have triangles ---- */
 
-/* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
- * little from it; others stay crisp. */
-static void smooth_normals(const drape_collider_shape *shape, drape_body *body)
+void drape_body_follow(const drape_collider_shape *shape, drape_body *body)
 {
+    size_t count = 3 * (size_t)shape->triangle_count;
+    for (size_t i = 0; i < count; i += 3) {
+        double e1[3], e2[3], normal[3];
+        const double *p[3];
+        for (size_t c = 0; c < 3; c++)
+            p[c] = shape->point + 3 * (size_t)shape->triangle[i + c];
+        vec3_sub(p[1], p[0], e1);
+        vec3_sub(p[2], p[0], e2);
+        vec3_cross(e1, e2, normal);
+        double length = vec3_norm(normal);
+        for (size_t c = 0; c < 3; c++)
+            for (size_t k = 0; k < 3; k++) {
+                body->vertex[6 * (i + c) + k] = (float)p[c][k];
+                body->vertex[6 * (i + c) + 3 + k] = (float)(length > 0 ? normal[k] / length : 0);
+            }
+    }
+    body->vertex_count = count;
+    /* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
+     * little from it; others stay crisp. */
     double *sum = body->sum;
     memset(sum, 0, 3 * (size_t)shape->point_count * sizeof *sum);
     for (size_t i = 0; i < body->vertex_count; i++) {
@@ -322,43 +308,30 @@ static void smooth_normals(const drape_collider_shape *shape, drape_body *body)
     }
 }
 
-void drape_body_follow(const drape_collider_shape *shape, drape_body *body)
+drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],
+                               double reach, drape_body *body)
 {
-    size_t count = 3 * (size_t)shape->triangle_count;
-    for (size_t i = 0; i < count; i += 3) {
-        double e1[3], e2[3], normal[3];
-        const double *p[3];
-        for (size_t c = 0; c < 3; c++)
-            p[c] = shape->point + 3 * (size_t)shape->triangle[i + c];
-        vec3_sub(p[1], p[0], e1);
-        vec3_sub(p[2], p[0], e2);
-        vec3_cross(e1, e2, normal);
-        double length = vec3_norm(normal);
-        for (size_t c = 0; c < 3; c++)
-            for (size_t k = 0; k < 3; k++) {
-                body->vertex[6 * (i + c) + k] = (float)p[c][k];
-                body->vertex[6 * (i + c) + 3 + k] = (float)(length > 0 ? normal[k] / length : 0);
-            }
+    *body = (drape_body){.endless = false};
+    /* The extent along each axis: from very far away the surface is nearly a plane across that axis. */
+    for (int k = 0; k < 3; k++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double x[3] = {center[0], center[1], center[2]};
+            x[k] += sign * FAR * reach;
+            double extent = FAR * reach - distance(collider, x, NULL);
+            body->endless |= extent > FAR * reach / 2;
+            *(sign > 0 ? &body->high[k] : &body->low[k]) = center[k] + sign * extent;
+        }
+    for (int k = 0; body->endless && k < 3; k++) {
+        body->low[k] = center[k] - ENDLESS * reach;
+        body->high[k] = center[k] + ENDLESS * reach;
     }
-    body->vertex_count = count;
-    smooth_normals(shape, body);
-}
-
-static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
-{
+    const drape_collider_shape *shape = &collider->shape;
+    if (shape->triangle_count == 0)
+        return contour(arena, collider, body);
     body->vertex = drape_arena_take(arena, 18 * (size_t)shape->triangle_count, sizeof *body->vertex);
     body->sum = drape_arena_take(arena, (size_t)shape->point_count, 3 * sizeof *body->sum);
     if (!body->vertex || !body->sum)
         return DRAPE_E_MEMORY;
     drape_body_follow(shape, body);
     return DRAPE_OK;
-}
-
-drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],
-                               double reach, drape_body *body)
-{
-    *body = (drape_body){.endless = false};
-    find_box(collider, center, reach, body);
-    return collider->shape.triangle_count > 0 ? copy_triangles(arena, &collider->shape, body)
-                                              : contour(arena, collider, body);
 }

@@ -15,10 +15,11 @@ static bool runs_along(const drape_mesh *mesh, int32_t t, int32_t a, int32_t b)
     return (n[0] == a && n[1] == b) || (n[1] == a && n[2] == b) || (n[2] == a && n[0] == b);
 }
 
-/* Six times the volume: the sum of the tetrahedra with the first node as apex, which is near to all others,
- * as the origin need not be. */
-static double six_volumes(const drape_mesh *mesh)
+drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_source *source,
+                                      const drape_mesh *mesh)
 {
+    /* The sum of the tetrahedra with the first node as apex, which is near to all others, as the origin need
+     * not be. */
     double sum = 0, side[3][3], cross[3];
     for (int32_t t = 0; t < mesh->triangle_count; t++) {
         for (int k = 0; k < 3; k++)
@@ -26,13 +27,7 @@ static double six_volumes(const drape_mesh *mesh)
         vec3_cross(side[0], side[1], cross);
         sum += vec3_dot(cross, side[2]);
     }
-    return sum;
-}
-
-drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_source *source,
-                                      const drape_mesh *mesh)
-{
-    const double volume = six_volumes(mesh) / 6;
+    const double volume = sum / 6;
     if (volume > 0)
         return drape_check_cancel_after(ctx, 8 * (size_t)mesh->triangle_count);
     return drape_mesh_fail(ctx, source, 0,
@@ -41,8 +36,16 @@ drape_status drape_shape_check_volume(drape_context *ctx, const drape_mesh_sourc
                            volume);
 }
 
-static drape_status check_closed(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
+                                    drape_mesh *mesh)
 {
+    drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
+    if (!status)
+        status = drape_mesh_connect(ctx, source, mesh);
+    if (!status)
+        status = drape_mesh_validate_nodes(ctx, source, mesh);
+    if (status || !closed)
+        return status;
     for (int32_t e = 0; e < mesh->edge_count; e++) {
         const int32_t *ends = mesh->edge + 2 * (size_t)e, *beside = mesh->edge_triangle + 2 * (size_t)e;
         if (beside[1] < 0) {
@@ -61,17 +64,6 @@ static drape_status check_closed(drape_context *ctx, const drape_mesh_source *so
                 (int)beside[0], (int)beside[1], (int)ends[0], (int)ends[1]);
     }
     return drape_shape_check_volume(ctx, source, mesh);
-}
-
-drape_status drape_shape_check_mesh(drape_context *ctx, const drape_mesh_source *source, bool closed,
-                                    drape_mesh *mesh)
-{
-    drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
-    if (!status)
-        status = drape_mesh_connect(ctx, source, mesh);
-    if (!status)
-        status = drape_mesh_validate_nodes(ctx, source, mesh);
-    return status || !closed ? status : check_closed(ctx, source, mesh);
 }
 
 drape_status drape_shape_copy_mesh(const drape_mesh *mesh, drape_collider_shape *shape)

@@ -43,40 +43,8 @@ static const drape_param params[] = {
     DRAPE_NUMBER(
         "thickness", "m", 0, 0, 1e3,
         "distance of the surface that cloth meets from the triangles, on both sides of an open mesh"),
-    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"),
-    DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
-               "box, or the origin"),
-    DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",
-                 .uniform = true),
+    DRAPE_SHAPE_TRANSFORM_PARAMS,
 };
-
-static void transform(const double *values, const drape_mesh *mesh, drape_sequence *frames)
-{
-    const double *turn = values + ROTATE, rotate[4] = {turn[0], turn[1], turn[2], vec3_norm(turn)};
-    for (int32_t f = 0; f < frames->frame_count; f++) {
-        drape_mesh frame = {.node_count = mesh->node_count,
-                            .x = frames->x + 3 * (size_t)f * (size_t)mesh->node_count};
-        drape_mesh_transform(&frame, values + SCALE, rotate, values + TRANSLATE);
-    }
-    memcpy(mesh->x, frames->x, 3 * (size_t)mesh->node_count * sizeof *mesh->x);
-}
-
-/* A body that turned inside out between two frames would hold the cloth that is outside. */
-static drape_status check_volumes(drape_context *ctx, const char *at, const char *file,
-                                  const drape_mesh *mesh, const drape_sequence *frames)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t f = 1; !status && f < frames->frame_count; f++) {
-        char part[32];
-        snprintf(part, sizeof part, "frame %d: ", (int)f);
-        const drape_mesh_source source = {.pointer = at, .file = file, .part = part};
-        drape_mesh frame = *mesh;
-        frame.x = frames->x + 3 * (size_t)f * (size_t)mesh->node_count;
-        status = drape_shape_check_volume(ctx, &source, &frame);
-    }
-    return status;
-}
 
 /* Positions are checked before and after the transform: what is wrong in a file is reported there. */
 static drape_status read_frames(const double *values, drape_collider_shape *shape, drape_mesh *mesh,
@@ -101,11 +69,24 @@ static drape_status read_frames(const double *values, drape_collider_shape *shap
         status = drape_shape_check_mesh(builder->ctx, &file, values[OPEN] == 0, mesh);
     if (!status)
         status = drape_sequence_validate(builder->ctx, &file, mesh, frames);
-    if (!status && values[OPEN] == 0)
-        status = check_volumes(builder->ctx, at, def.file, mesh, frames);
+    for (int32_t f = 1; !status && values[OPEN] == 0 && f < frames->frame_count; f++) {
+        /* a body that turned inside out between two frames would hold the cloth that is outside */
+        char part[32];
+        snprintf(part, sizeof part, "frame %d: ", (int)f);
+        const drape_mesh_source source = {.pointer = at, .file = def.file, .part = part};
+        drape_mesh frame = *mesh;
+        frame.x = frames->x + 3 * (size_t)f * (size_t)mesh->node_count;
+        status = drape_shape_check_volume(builder->ctx, &source, &frame);
+    }
     if (status)
         return status;
-    transform(values, mesh, frames);
+    const double *turn = values + ROTATE, rotate[4] = {turn[0], turn[1], turn[2], vec3_norm(turn)};
+    for (int32_t f = 0; f < frames->frame_count; f++) {
+        drape_mesh frame = {.node_count = mesh->node_count,
+                            .x = frames->x + 3 * (size_t)f * (size_t)mesh->node_count};
+        drape_mesh_transform(&frame, values + SCALE, rotate, values + TRANSLATE);
+    }
+    memcpy(mesh->x, frames->x, 3 * (size_t)mesh->node_count * sizeof *mesh->x);
     return drape_sequence_validate(builder->ctx, &transformed, mesh, frames);
 }
 

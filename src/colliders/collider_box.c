@@ -12,54 +12,14 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
                  "full lengths of its edges along x, y, z before the rotation; one number: a cube",
                  .uniform = true),
-    DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
-               "box, or the origin"),
-    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its edges and corners, or rims, below half of its smallest extent; its size "
-                 "includes them"),
+    DRAPE_SHAPE_ROTATE_PARAM,
+    DRAPE_SHAPE_ROUNDING_PARAM,
 };
 
 /* Rows are the axes of the box: y = frame (x - center). */
 typedef struct frame {
     double axis[3][3];
 } frame;
-
-static drape_status keep_frame(const double *values, drape_collider_shape *shape)
-{
-    double turn[3][3];
-    const double *v = values + ROTATE, rotate[4] = {v[0], v[1], v[2], vec3_norm(v)};
-    frame *kept = drape_shape_take(shape, 1, sizeof *kept);
-    if (!kept)
-        return DRAPE_E_MEMORY;
-    drape_rotation_matrix(rotate, turn);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            kept->axis[i][j] = turn[j][i];
-    shape->kept = kept;
-    return DRAPE_OK;
-}
-
-/* Corner c lies on the high side of axis k where bit k of c is set; an edge joins corners that differ in one
- * bit. */
-static void fill_core(const double *values, const frame *f, drape_collider_shape *shape)
-{
-    int32_t *segment = shape->segment;
-    for (int32_t c = 0; c < 8; c++) {
-        double *point = shape->point + 3 * c;
-        for (int k = 0; k < 3; k++)
-            point[k] = values[CENTER + k];
-        for (int k = 0; k < 3; k++) {
-            double half = values[SIZE + k] / 2 - values[ROUNDING];
-            vec3_add_scaled(c >> k & 1 ? half : -half, f->axis[k], point);
-            if (!(c >> k & 1)) {
-                *segment++ = c;
-                *segment++ = c | 1 << k;
-            }
-        }
-    }
-    shape->radius = values[ROUNDING];
-}
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
 {
@@ -70,31 +30,34 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
         return drape_shape_refuse(shape, "rounding",
                                   "%.10g is not allowed; it is below half of the smallest size, %.10g m",
                                   values[ROUNDING], least / 2);
-    drape_status status = drape_shape_reserve(shape, 8, 12, 0);
-    if (!status)
-        status = keep_frame(values, shape);
-    if (!status)
-        fill_core(values, shape->kept, shape);
-    return status;
-}
-
-/* out = sum of g[k] axis[k] */
-static void turn_back(const frame *f, const double *g, double *out)
-{
-    for (int i = 0; i < 3; i++)
-        out[i] = g[0] * f->axis[0][i] + g[1] * f->axis[1][i] + g[2] * f->axis[2][i];
-}
-
-/* Outside of the core d = |max(q, 0)|: only directions in which q > 0 have curvature. */
-static void bend(const frame *f, const double *q, const double *g, double length, double *curvature)
-{
-    for (int i = 0; i < 9; i++) {
-        double sum = 0;
-        for (int a = 0; a < 3; a++)
-            for (int b = 0; b < 3; b++)
-                sum += ((a == b && q[a] > 0) - g[a] * g[b]) * f->axis[a][i / 3] * f->axis[b][i % 3];
-        curvature[i] = length > 0 ? sum / length : 0;
+    const drape_status status = drape_shape_reserve(shape, 8, 12, 0);
+    frame *kept = drape_shape_take(shape, 1, sizeof *kept);
+    if (status || !kept)
+        return status ? status : DRAPE_E_MEMORY;
+    double turn[3][3];
+    const double *v = values + ROTATE, rotate[4] = {v[0], v[1], v[2], vec3_norm(v)};
+    drape_rotation_matrix(rotate, turn);
+    for (int i = 0; i < 9; i++)
+        kept->axis[i / 3][i % 3] = turn[i % 3][i / 3];
+    shape->kept = kept;
+    /* Corner c lies on the high side of axis k where bit k of c is set; an edge joins corners that differ in
+     * one bit. */
+    int32_t *segment = shape->segment;
+    for (int32_t c = 0; c < 8; c++) {
+        double *point = shape->point + 3 * c;
+        for (int k = 0; k < 3; k++)
+            point[k] = values[CENTER + k];
+        for (int k = 0; k < 3; k++) {
+            const double half = values[SIZE + k] / 2 - values[ROUNDING];
+            vec3_add_scaled(c >> k & 1 ? half : -half, kept->axis[k], point);
+            if (!(c >> k & 1)) {
+                *segment++ = c;
+                *segment++ = c | 1 << k;
+            }
+        }
     }
+    shape->radius = values[ROUNDING];
+    return DRAPE_OK;
 }
 
 static double distance(const double *values, const drape_collider_shape *shape, const double *x,
@@ -116,10 +79,16 @@ static double distance(const double *values, const drape_collider_shape *shape, 
         g[k] = sign[k] * fmax(q[k], 0) / outside;
     if (!(outside > 0))
         g[most] = sign[most];
-    if (normal)
-        turn_back(f, g, normal);
-    if (curvature)
-        bend(f, q, g, outside, curvature);
+    for (int i = 0; normal && i < 3; i++)
+        normal[i] = g[0] * f->axis[0][i] + g[1] * f->axis[1][i] + g[2] * f->axis[2][i];
+    /* Outside of the core d = |max(q, 0)|: only directions in which q > 0 have curvature. */
+    for (int i = 0; curvature && i < 9; i++) {
+        double sum = 0;
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                sum += ((a == b && q[a] > 0) - g[a] * g[b]) * f->axis[a][i / 3] * f->axis[b][i % 3];
+        curvature[i] = outside > 0 ? sum / outside : 0;
+    }
     return (outside > 0 ? outside : q[most]) - values[ROUNDING];
 }
 

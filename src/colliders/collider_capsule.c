@@ -8,11 +8,8 @@
 
 enum { A = 0, B = 3, RADIUS = 6, PARAM_COUNT = 3 }; /* places of the values */
 
-#define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
-
 static const drape_param params[PARAM_COUNT] = {
-    END("a", "center of one of the ends, flat or a hemisphere"),
-    END("b", "center of the other one"),
+    DRAPE_SHAPE_END_PARAMS,
     DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "its radius"),
 };
 

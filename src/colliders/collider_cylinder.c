@@ -13,92 +13,68 @@ enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of t
 #define MIN_SIDES 12
 #define MAX_SIDES 512
 
-#define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
-
 static const drape_param params[PARAM_COUNT] = {
-    END("a", "center of one of the ends, flat or a hemisphere"),
-    END("b", "center of the other one"),
+    DRAPE_SHAPE_END_PARAMS,
     DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "its radius"),
-    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its edges and corners, or rims, below half of its smallest extent; its size "
-                 "includes them"),
+    DRAPE_SHAPE_ROUNDING_PARAM,
 };
 
 typedef struct axis {
     double middle[3], u[3], half; /* half the length of the core, without the rounding */
 } axis;
 
-static drape_status keep_axis(const double *values, drape_collider_shape *shape)
+static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
 {
-    axis *kept = drape_shape_take(shape, 1, sizeof *kept);
-    if (!kept)
+    axis *c = drape_shape_take(shape, 1, sizeof *c);
+    if (!c)
         return DRAPE_E_MEMORY;
-    vec3_sub(values + B, values + A, kept->u);
-    double length = vec3_norm(kept->u);
+    vec3_sub(values + B, values + A, c->u);
+    const double length = vec3_norm(c->u), most = fmin(values[RADIUS], length / 2);
     if (!(length > 0))
         return drape_shape_refuse(shape, "b", "it is equal to a; a cylinder has a length above 0");
-    double most = fmin(values[RADIUS], length / 2);
     if (!(values[ROUNDING] < most))
         return drape_shape_refuse(
             shape, "rounding", "%.10g is not allowed; it is below the radius and half of the length, %.10g m",
             values[ROUNDING], most);
     for (int k = 0; k < 3; k++) {
-        kept->u[k] /= length;
-        kept->middle[k] = (values[A + k] + values[B + k]) / 2;
+        c->u[k] /= length;
+        c->middle[k] = (values[A + k] + values[B + k]) / 2;
     }
-    kept->half = length / 2 - values[ROUNDING];
-    shape->kept = kept;
-    return DRAPE_OK;
-}
-
-/* The middle of a side of a prism with n sides is radius (1 - cos(pi / n)) inside of the circle. */
-static int32_t sides_of(double radius, double tolerance)
-{
-    const double sag = tolerance / radius, cosine = 1 - sag;
-    const double sides = cosine > 0 ? ceil(DRAPE_PI / drape_atan2(sqrt(sag * (2 - sag)), cosine)) : MIN_SIDES;
-    return (int32_t)fmin(fmax(sides, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
-}
-
-/* Points 2 s and 2 s + 1 are the ends of ridge s. */
-static void fill_prism(const axis *c, double radius, int32_t sides, drape_collider_shape *shape)
-{
-    const double turn = 2 * DRAPE_PI;
+    c->half = length / 2 - values[ROUNDING];
+    shape->kept = c;
+    shape->radius = values[ROUNDING];
+    shape->inscribed = true;
+    /* The middle of a side of a prism with n sides is radius (1 - cos(pi / n)) inside of the circle. */
+    const double core = values[RADIUS] - values[ROUNDING], sag = tolerance / core, cos_half = 1 - sag,
+                 least =
+                     cos_half > 0 ? ceil(DRAPE_PI / drape_atan2(sqrt(sag * (2 - sag)), cos_half)) : MIN_SIDES;
+    const int32_t sides =
+        (int32_t)fmin(fmax(least, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
+    const drape_status status = drape_shape_reserve(shape, 2 * sides, 3 * sides, 0);
+    if (status)
+        return status;
     double e[3], f[3];
     int32_t *segment = shape->segment;
     round_across(c->u, e);
     vec3_cross(c->u, e, f);
-    for (int32_t s = 0; s < sides; s++) {
+    for (int32_t s = 0; s < sides; s++) { /* points 2 s and 2 s + 1 are the ends of ridge s */
+        const double turn = 2 * DRAPE_PI;
         double sine, cosine;
         drape_sin_cos(turn * s / sides, &sine, &cosine);
-        int32_t next = (s + 1) % sides;
         for (int32_t end = 0; end < 2; end++) {
             double *point = shape->point + 3 * (2 * s + end);
             for (int k = 0; k < 3; k++)
                 point[k] = c->middle[k];
             vec3_add_scaled(end ? c->half : -c->half, c->u, point);
-            vec3_add_scaled(radius * cosine, e, point);
-            vec3_add_scaled(radius * sine, f, point);
+            vec3_add_scaled(core * cosine, e, point);
+            vec3_add_scaled(core * sine, f, point);
             *segment++ = 2 * s + end;
-            *segment++ = 2 * next + end;
+            *segment++ = 2 * ((s + 1) % sides) + end;
         }
         *segment++ = 2 * s;
         *segment++ = 2 * s + 1;
     }
-}
-
-static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
-{
-    drape_status status = keep_axis(values, shape);
-    if (status)
-        return status;
-    double core = values[RADIUS] - values[ROUNDING];
-    int32_t sides = sides_of(core, tolerance);
-    status = drape_shape_reserve(shape, 2 * sides, 3 * sides, 0);
-    if (!status)
-        fill_prism(shape->kept, core, sides, shape);
-    shape->radius = values[ROUNDING];
-    shape->inscribed = true;
-    return status;
+    return DRAPE_OK;
 }
 
 /* f and its derivatives by rho and z in the half plane of the axis. */

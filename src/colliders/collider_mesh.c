@@ -12,12 +12,7 @@ enum { FILE_NAME = 0, TRANSLATE = 1, ROTATE = 4, SCALE = 7, PARAM_COUNT = 4 };
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_TEXT("file", "OBJ or PLY file, relative to the scene: a closed mesh, its triangles "
                        "counterclockwise seen from outside"),
-    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"),
-    DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "axis and angle, or a vector along the axis whose length is the angle; about the center of a "
-               "box, or the origin"),
-    DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",
-                 .uniform = true),
+    DRAPE_SHAPE_TRANSFORM_PARAMS,
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)

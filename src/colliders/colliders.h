@@ -38,6 +38,24 @@ struct drape_shape_builder {
     drape_sequence frames; /* of a collider that deforms (drape_collider.frames) */
 };
 
+/* Parameters that several colliders have. */
+#define DRAPE_SHAPE_ROTATE_PARAM                                                                             \
+    DRAPE_TURN(                                                                                              \
+        "rotate", 0, -1e6, 1e6,                                                                              \
+        "axis and angle, or a vector along the axis whose length is the angle; about the center of a "       \
+        "box, or the origin")
+#define DRAPE_SHAPE_ROUNDING_PARAM                                                                           \
+    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,                                                                 \
+                 "radius of its edges and corners, or rims, below half of its smallest extent; its size "    \
+                 "includes them")
+#define DRAPE_SHAPE_END_PARAMS                                                                               \
+    DRAPE_VECTOR("a", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of one of the ends, flat or a hemisphere"),    \
+        DRAPE_VECTOR("b", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the other one")
+#define DRAPE_SHAPE_TRANSFORM_PARAMS                                                                         \
+    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"), DRAPE_SHAPE_ROTATE_PARAM,                  \
+        DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",   \
+                     .uniform = true)
+
 /* The text that the scene gives a parameter; NULL: none. */
 const char *drape_shape_text(const drape_collider_shape *shape, const char *parameter);
 

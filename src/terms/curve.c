@@ -34,13 +34,6 @@ static double end_slope(double h0, double h1, double chord0, double chord1)
     return fmin(fmax(parabola, chord0 / 3), 3 * chord0);
 }
 
-/* The slope at a point between two chords: their lengths along the strain, and slopes. */
-static double middle_slope(double h0, double h1, double chord0, double chord1)
-{
-    const double w0 = 2 * h1 + h0, w1 = h1 + 2 * h0;
-    return (w0 + w1) / (w0 / chord0 + w1 / chord1);
-}
-
 /* Point number i > 0, counted from the origin, which is point 0. */
 static void point_at(const drape_points *points, double (*strain_of)(double), int32_t i, double *s, double *f)
 {
@@ -61,8 +54,8 @@ void drape_curve_make(const drape_points *points, double (*strain_of)(double), d
         double after = chord; /* of a single point */
         if (i + 1 < count) {
             point_at(points, strain_of, i + 2, &s2, &f2);
-            const double h1 = s2 - s1, chord1 = (f2 - f1) / h1;
-            after = middle_slope(h, h1, chord, chord1);
+            const double h1 = s2 - s1, chord1 = (f2 - f1) / h1, w0 = 2 * h1 + h, w1 = h1 + 2 * h;
+            after = (w0 + w1) / (w0 / chord + w1 / chord1);
             if (i == 0)
                 before = end_slope(h, h1, chord, chord1);
         } else if (i > 0) {

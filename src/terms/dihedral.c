@@ -1,14 +1,6 @@
 /* dihedral.c: see dihedral.h. */
 #include "terms/dihedral.h"
 
-/* The full Hessian of the hinge in a lane, from its blocks on and below the diagonal. */
-static void take_hessian(const double *from, double h[144])
-{
-    for (int i = 0; i < 12; i++)
-        for (int j = 0; j < i - i % 3 + 3; j++)
-            h[12 * i + j] = h[12 * j + i] = from[LANES * (12 * i + j)];
-}
-
 void drape_dihedral_tie(int lane, double *ds, double *dds)
 {
     double h[144];
@@ -18,7 +10,10 @@ void drape_dihedral_tie(int lane, double *ds, double *dds)
         ds[LANES * i + lane] = 0;
     if (!dds)
         return;
-    take_hessian(dds + lane, h);
+    /* The full Hessian of the hinge in a lane, from its blocks on and below the diagonal. */
+    for (int i = 0; i < 12; i++)
+        for (int j = 0; j < i - i % 3 + 3; j++)
+            h[12 * i + j] = h[12 * j + i] = dds[LANES * (12 * i + j) + lane];
     for (int i = 0; i < 12; i++)
         for (int j = 0; j < 6; j++)
             h[12 * i + j] += h[12 * i + 9 + j % 3] / 2;

@@ -28,11 +28,6 @@ void drape_orthotropic_law(const double *values, const drape_woven *measured, do
     memcpy(c, law, sizeof law);
 }
 
-static bool is_isotropic(const double c[9])
-{
-    return c[0] == c[4] && fabs(2 * c[8] - (c[0] - c[1])) <= 1e-12 * c[0];
-}
-
 /* The unit vector along the projection of a into the plane with unit normal n; false if half of its digits
  * are rounding errors. */
 static bool project(const double a[3], const double n[3], double out[3])
@@ -60,8 +55,9 @@ bool drape_orthotropic_frame(const double *values, const double *const corner[3]
     const double twice_area = vec3_norm(n);
     for (int i = 0; i < 3; i++)
         n[i] /= twice_area;
+    const bool isotropic = c[0] == c[4] && fabs(2 * c[8] - (c[0] - c[1])) <= 1e-12 * c[0];
     if (!project(vec3_norm(warp) > 0 ? warp : x_axis, n, axes)) {
-        if (!is_isotropic(c))
+        if (!isotropic)
             return false;
         project(a, n, axes);
     }

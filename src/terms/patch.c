@@ -18,28 +18,6 @@ static int corner_of(const int32_t *nodes, int32_t node)
     return nodes[0] == node ? 0 : nodes[1] == node ? 1 : 2;
 }
 
-static int32_t edge_of(const drape_cloth_view *cloth, int32_t triangle, int32_t a, int32_t b)
-{
-    const int32_t *own = cloth->triangle + 3 * (size_t)triangle;
-    const int i = corner_of(own, a), j = corner_of(own, b), side = (i + 1) % 3 == j ? i : j;
-    return cloth->triangle_edge[3 * (size_t)triangle + (size_t)side];
-}
-
-/* The image of an edge, a translation of it: which of its nodes is that of a, and the displacement back. */
-static void cross(const drape_cloth_view *cloth, int32_t image, drape_beyond *out)
-{
-    const int32_t *end = cloth->edge + 2 * (size_t)image, a = out->a, b = out->b;
-    double along[3], other[3];
-    vec3_sub(cloth->rest + 3 * (size_t)b, cloth->rest + 3 * (size_t)a, along);
-    vec3_sub(cloth->rest + 3 * (size_t)end[1], cloth->rest + 3 * (size_t)end[0], other);
-    const int first = vec3_dot(along, other) < 0;
-    out->across = true;
-    out->a = end[first];
-    out->b = end[1 - first];
-    vec3_sub(cloth->rest + 3 * (size_t)a, cloth->rest + 3 * (size_t)out->a, out->at_rest);
-    vec3_sub(cloth->start + 3 * (size_t)a, cloth->start + 3 * (size_t)out->a, out->shift);
-}
-
 drape_beyond drape_beyond_edge(const drape_cloth_view *cloth, int32_t triangle, int32_t edge, int32_t a,
                                int32_t b)
 {
@@ -48,8 +26,18 @@ drape_beyond drape_beyond_edge(const drape_cloth_view *cloth, int32_t triangle, 
     drape_beyond out = {
         .triangle = beside[0] == triangle ? beside[1] : beside[0], .apex = -1, .a = a, .b = b};
     if (image >= 0) {
+        /* the image is a translation of the edge: which of its nodes is a, and the displacement back */
+        const int32_t *end = cloth->edge + 2 * (size_t)image;
+        double along[3], other[3];
+        vec3_sub(cloth->rest + 3 * (size_t)b, cloth->rest + 3 * (size_t)a, along);
+        vec3_sub(cloth->rest + 3 * (size_t)end[1], cloth->rest + 3 * (size_t)end[0], other);
+        const int first = vec3_dot(along, other) < 0;
         out.triangle = cloth->edge_triangle[2 * (size_t)image];
-        cross(cloth, image, &out);
+        out.across = true;
+        out.a = end[first];
+        out.b = end[1 - first];
+        vec3_sub(cloth->rest + 3 * (size_t)a, cloth->rest + 3 * (size_t)out.a, out.at_rest);
+        vec3_sub(cloth->start + 3 * (size_t)a, cloth->start + 3 * (size_t)out.a, out.shift);
     }
     for (int k = 0; out.triangle >= 0 && k < 3; k++) {
         const int32_t node = cloth->triangle[3 * (size_t)out.triangle + (size_t)k];
@@ -65,7 +53,9 @@ static drape_beyond add_beyond(const drape_cloth_view *cloth, const drape_beyond
                                int32_t b, drape_patch *out)
 {
     const int *local = drape_patch_hinge[h], apex = local[3];
-    const int32_t edge = edge_of(cloth, from->triangle, a, b);
+    const int32_t *own = cloth->triangle + 3 * (size_t)from->triangle;
+    const int i = corner_of(own, a), j = corner_of(own, b), side = (i + 1) % 3 == j ? i : j;
+    const int32_t edge = cloth->triangle_edge[3 * (size_t)from->triangle + (size_t)side];
     drape_beyond next = drape_beyond_edge(cloth, from->triangle, edge, a, b);
     out->edge[h] = edge;
     out->beyond[h] = next.triangle;

@@ -113,10 +113,10 @@ void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count,
 }
 
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
-                                int32_t every, drape_ratio *ratio_of, drape_fault *fault)
+                                int32_t every, drape_ratio *ratio_of, drape_reason reason, const char *what,
+                                drape_fault *fault)
 {
-    fault->element = -1;
-    fault->value = INFINITY;
+    *fault = (drape_fault){drape_reason_name(reason), what, -1, INFINITY, DRAPE_MIN_RATIO};
     for (int32_t e = 0; e < el->count; e += every) {
         double ratio = ratio_of(el, e, x);
         if (!(ratio < fault->value))

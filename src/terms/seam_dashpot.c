@@ -20,54 +20,18 @@ static const drape_param params[] = {
                  "than 0.001 of that of neighbours"),
 };
 
-/* The root of the mean area of the nodes that the seam joins. */
-static double spacing_of(const drape_seam_view *seam)
+static drape_status build(const drape_seam_view *seam, const double *values, drape_term_builder *builder)
 {
-    double area = 0;
+    double area = 0; /* the mean of the nodes that the seam joins */
     for (int32_t i = 0; i < 2 * seam->pair_count; i++) {
         const int side = i % 2;
         area += seam->cloth[side]->node_area[seam->pair[i] - seam->first_node[side]] / (2 * seam->pair_count);
     }
-    return sqrt(area);
-}
-
-static drape_status build(const drape_seam_view *seam, const double *values, drape_term_builder *builder)
-{
-    const double rest[REST_COUNT] = {
-        [REST_COEFFICIENT] = *values, [REST_SMOOTHING] = SHARE * spacing_of(seam)};
+    const double rest[REST_COUNT] = {[REST_COEFFICIENT] = *values, [REST_SMOOTHING] = SHARE * sqrt(area)};
     const drape_status status = drape_term_reserve(builder, seam->pair_count, REST_COUNT);
     for (int32_t i = 0; !status && i < seam->pair_count; i++)
         drape_term_set(builder, i, seam->pair + 2 * (size_t)i, rest);
     return status;
-}
-
-/* From the 3 x 3 block of the second node on itself, that of the element: nodes act on each other in opposite
- * directions, and only by their difference. */
-static void spread(const double block[9], double *out)
-{
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++)
-            out[6 * i + j] = ((i < 3) == (j < 3) ? 1 : -1) * block[3 * (i % 3) + j % 3];
-}
-
-static void damp(const double d[3], const double w[3], double c, double s, double *g, double *dg_dx,
-                 double *dg_dv)
-{
-    const double q = 1 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + s * s),
-                 rate = q * (d[0] * w[0] + d[1] * w[1] + d[2] * w[2]); /* force c rate d */
-    double by_x[9], by_v[9];
-    for (int i = 0; i < 3; i++) {
-        g[i] = -c * rate * d[i];
-        g[3 + i] = c * rate * d[i];
-        for (int j = 0; j < 3; j++) {
-            by_v[3 * i + j] = c * q * d[i] * d[j];
-            by_x[3 * i + j] = c * (d[i] * (q * w[j] - 2 * rate * q * d[j]) + (i == j ? rate : 0));
-        }
-    }
-    if (dg_dx)
-        spread(by_x, dg_dx);
-    if (dg_dv)
-        spread(by_v, dg_dv);
 }
 
 static void dissipation(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -81,9 +45,23 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
             d[k] = x[b + (size_t)k] - x[a + (size_t)k];
             w[k] = v[b + (size_t)k] - v[a + (size_t)k];
         }
-        damp(d, w, drape_rest_of(el, REST_COEFFICIENT, first + i),
-             drape_rest_of(el, REST_SMOOTHING, first + i), g + 6 * row, dg_dx ? dg_dx + 36 * row : NULL,
-             dg_dv ? dg_dv + 36 * row : NULL);
+        const double c = drape_rest_of(el, REST_COEFFICIENT, first + i),
+                     s = drape_rest_of(el, REST_SMOOTHING, first + i),
+                     q = 1 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + s * s),
+                     rate = q * (d[0] * w[0] + d[1] * w[1] + d[2] * w[2]); /* force c rate d */
+        double by_x[9], by_v[9];
+        for (int k = 0; k < 3; k++) {
+            g[6 * row + (size_t)k] = -c * rate * d[k];
+            g[6 * row + 3 + (size_t)k] = c * rate * d[k];
+            for (int j = 0; j < 3; j++) {
+                by_v[3 * k + j] = c * q * d[k] * d[j];
+                by_x[3 * k + j] = c * (d[k] * (q * w[j] - 2 * rate * q * d[j]) + (k == j ? rate : 0));
+            }
+        }
+        if (dg_dx)
+            drape_pair_block(by_x, dg_dx + 36 * row);
+        if (dg_dv)
+            drape_pair_block(by_v, dg_dv + 36 * row);
     }
 }
 

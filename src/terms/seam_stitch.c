@@ -67,14 +67,11 @@ static void stitch(const drape_elements *el, int32_t element, const double *x, d
         g[i] = -pull * d[i];
         g[3 + i] = pull * d[i];
     }
-    for (int i = 0; hess && i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            /* k ((1 - r/l) I + r/l n n') */
-            const double along = slack > 0 ? k * slack * (d[i] / l) * (d[j] / l) : 0,
-                         h = along + (i == j ? pull : 0);
-            hess[6 * i + j] = hess[6 * (3 + i) + 3 + j] = h;
-            hess[6 * (3 + i) + j] = hess[6 * i + 3 + j] = -h;
-        }
+    double h[9]; /* k ((1 - r/l) I + r/l n n') */
+    for (int i = 0; hess && i < 9; i++)
+        h[i] = (slack > 0 ? k * slack * (d[i / 3] / l) * (d[i % 3] / l) : 0) + (i % 4 == 0 ? pull : 0);
+    if (hess)
+        drape_pair_block(h, hess);
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

@@ -1,7 +1,6 @@
 /* spring.c: see spring.h. With n n' and P = (I - n n')/l: dq = (-n, n), ddq = [P -P; -P P]. */
 #include "terms/spring.h"
 
-#include "base/reason.h"
 #include "base/vec3.h"
 
 #include <math.h>
@@ -78,16 +77,6 @@ double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pai
 
 /* ---- Building ---- */
 
-/* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in Boson,
- * they differ, and the net force of a sheet is not zero. */
-static double gradient_factor(const drape_cloth_view *cloth, const int32_t pair[2], double gradient)
-{
-    if (gradient == 0)
-        return 1;
-    double row = 0.5 * (pair[0] / cloth->columns + pair[1] / cloth->columns);
-    return 1 + gradient * (1 - row / cloth->rows);
-}
-
 drape_status drape_spring_build(const drape_spring_set *set, const double *values,
                                 drape_term_builder *builder)
 {
@@ -95,16 +84,21 @@ drape_status drape_spring_build(const drape_spring_set *set, const double *value
         return drape_term_refuse(builder,
                                  "\"gradient\" = %g goes from row to row of a grid; this mesh has no rows",
                                  values[DRAPE_SPRING_GRADIENT]);
-    int32_t count = drape_spring_count(set);
+    const int32_t count = drape_spring_count(set), columns = set->cloth->columns;
+    const double gradient = values[DRAPE_SPRING_GRADIENT];
     drape_status status = drape_term_reserve(builder, count, REST_COUNT);
     for (int32_t i = 0; !status && i < count; i++) {
         int32_t pair[2];
         drape_spring_pair(set, i, pair);
         double k = values[DRAPE_SPRING_STIFFNESS] * values[DRAPE_SPRING_FACTOR];
-        double rest[REST_COUNT] = {
-            [REST_K] = k * gradient_factor(set->cloth, pair, values[DRAPE_SPRING_GRADIENT]),
-            [REST_LENGTH] = values[DRAPE_SPRING_REST_SCALE] * drape_spring_rest_length(set->cloth, pair),
-            [REST_DAMPING] = values[DRAPE_SPRING_DAMPING]};
+        /* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in
+         * Boson, they differ, and the net force of a sheet is not zero. */
+        if (gradient != 0)
+            k *= 1 + gradient * (1 - 0.5 * (pair[0] / columns + pair[1] / columns) / set->cloth->rows);
+        double rest[REST_COUNT] = {[REST_K] = k,
+                                   [REST_LENGTH] = values[DRAPE_SPRING_REST_SCALE] *
+                                                   drape_spring_rest_length(set->cloth, pair),
+                                   [REST_DAMPING] = values[DRAPE_SPRING_DAMPING]};
         drape_term_set(builder, i, pair, rest);
     }
     return status;
@@ -124,17 +118,6 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
 
 /* ---- The spring ---- */
 
-/* ddq = [P -P; -P P] with P = (I - n n')/l */
-static void hessian(const double n[3], double length, double *ddq)
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double p = ((i == j) - n[i] * n[j]) / length;
-            ddq[6 * i + j] = ddq[6 * (3 + i) + 3 + j] = p;
-            ddq[6 * i + 3 + j] = ddq[6 * (3 + i) + j] = -p;
-        }
-}
-
 void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                           const double *internal, double *q, double *dq, double *ddq)
 {
@@ -150,8 +133,11 @@ void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count
             dq[6 * i + 3 + k] = n[k];
             dq[6 * i + k] = -n[k];
         }
+        double p[9];
+        for (int k = 0; ddq && k < 9; k++)
+            p[k] = ((k % 4 == 0) - n[k / 3] * n[k % 3]) / q[i];
         if (ddq)
-            hessian(n, q[i], ddq + 36 * (size_t)i);
+            drape_pair_block(p, ddq + 36 * (size_t)i);
     }
 }
 
@@ -173,8 +159,6 @@ drape_status drape_spring_check(const drape_elements *el, const double *x, const
                                 const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_SPRING_COLLAPSE),
-                           .what = "spring length / rest length",
-                           .limit = DRAPE_MIN_RATIO};
-    return drape_check_ratios(el, x, before, 1, ratio_of, fault);
+    return drape_check_ratios(el, x, before, 1, ratio_of, DRAPE_REASON_SPRING_COLLAPSE,
+                              "spring length / rest length", fault);
 }

@@ -1,7 +1,6 @@
 /* strain.c: see strain.h. */
 #include "terms/strain.h"
 
-#include "base/reason.h"
 #include "base/vec3.h"
 
 void drape_strain_law(const drape_cloth_view *cloth, const double *values, double c[9], double k[3],
@@ -36,8 +35,6 @@ drape_status drape_strain_check(const drape_elements *el, const double *x, const
                                 const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
-                           .what = "area / rest area",
-                           .limit = DRAPE_MIN_RATIO};
-    return drape_check_ratios(el, x, before, 3, ratio_of, fault);
+    return drape_check_ratios(el, x, before, 3, ratio_of, DRAPE_REASON_AREA_COLLAPSE, "area / rest area",
+                              fault);
 }

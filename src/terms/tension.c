@@ -120,16 +120,6 @@ static void find_direction(const double c[9], const double t0[3], wrinkle *w)
     }
 }
 
-/* ---- The law ---- */
-
-static void taut(const double c[9], const double e[3], const double t0[3], drape_tension *out)
-{
-    out->state = DRAPE_TAUT;
-    out->energy = 0.5 * dot(e, t0);
-    memcpy(out->stress, t0, sizeof out->stress);
-    memcpy(out->tangent, c, sizeof out->tangent);
-}
-
 static void wrinkled(const double c[9], const double e[3], const double t0[3], const wrinkle *w, double t,
                      drape_tension *out)
 {
@@ -157,7 +147,10 @@ void drape_tension_relax(const double c[9], const double e[3], drape_tension *ou
     wrinkle w;
     apply(c, e, t0);
     if (lower(t0[0] + t0[1], t0[0] - t0[1], t0[2]) >= -ROUNDING * (c[0] + c[4])) {
-        taut(c, e, t0, out);
+        out->state = DRAPE_TAUT;
+        out->energy = 0.5 * dot(e, t0);
+        memcpy(out->stress, t0, sizeof out->stress);
+        memcpy(out->tangent, c, sizeof out->tangent);
         return;
     }
     *out = (drape_tension){.state = DRAPE_SLACK};

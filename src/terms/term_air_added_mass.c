@@ -102,54 +102,19 @@ static flow by_place(const flow *f, int i, int k)
     return d;
 }
 
-/* That with component k of the velocity of a node which has this share of the mean. */
-static flow by_velocity(const flow *f, int k, double share)
-{
-    flow d = {0};
-    d.r[k] = -share;
-    d.q = -share * f->m[k];
-    return d;
-}
-
-/* ---- Energy of motion ---- */
-
-/* dT/dm; dT/dx of a node is its vector product with the opposite edge. */
-static void by_normal(const flow *f, double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = f->mass * f->q * (f->r[k] / (2 * f->l) - f->q * f->m[k] / (4 * f->l * f->l * f->l));
-}
-
-static void by_normal_change(const flow *f, const flow *d, double out[3])
-{
-    const double l3 = f->l * f->l * f->l;
-    for (int k = 0; k < 3; k++)
-        out[k] = f->mass *
-                 ((d->q * f->r[k] + f->q * d->r[k] - f->q * f->r[k] * d->l / f->l) / (2 * f->l) -
-                  f->q * (2 * d->q * f->m[k] + f->q * d->m[k] - 3 * f->q * f->m[k] * d->l / f->l) / (4 * l3));
-}
-
-/* The momentum of each node. */
-static void momentum(const flow *f, double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = -f->mass / 6 * f->q * f->m[k] / f->l;
-}
-
-static void momentum_change(const flow *f, const flow *d, double out[3])
-{
-    for (int k = 0; k < 3; k++)
-        out[k] = -f->mass / 6 * (d->q * f->m[k] + f->q * d->m[k] - f->q * f->m[k] * d->l / f->l) / f->l;
-}
-
 /* xx, vx and vv of one triangle, from dT/dm = g. */
 static void second_derivatives(const flow *f, const double g[3], double *xx, double *vx, double *vv)
 {
     for (int column = 0; column < D; column++) {
         const flow d = by_place(f, column / 3, column % 3);
         double dg[3], dp[3], a[3], b[3];
-        by_normal_change(f, &d, dg);
-        momentum_change(f, &d, dp);
+        const double l3 = f->l * f->l * f->l;
+        for (int k = 0; k < 3; k++) {
+            dg[k] = f->mass *
+                    ((d.q * f->r[k] + f->q * d.r[k] - f->q * f->r[k] * d.l / f->l) / (2 * f->l) -
+                     f->q * (2 * d.q * f->m[k] + f->q * d.m[k] - 3 * f->q * f->m[k] * d.l / f->l) / (4 * l3));
+            dp[k] = -f->mass / 6 * (d.q * f->m[k] + f->q * d.m[k] - f->q * f->m[k] * d.l / f->l) / f->l;
+        }
         for (int i = 0; i < 3; i++) {
             vec3_cross(d.opposite[i], g, a);
             vec3_cross(f->opposite[i], dg, b);
@@ -191,8 +156,11 @@ static void kinetic(const drape_elements *el, int32_t first, int32_t count, cons
         if (out->t)
             out->t[i] = f.mass * f.q * f.q / (4 * f.l);
         double g[3], p[3], moment[3];
-        by_normal(&f, g);
-        momentum(&f, p);
+        /* g = dT/dm, whose vector product with the opposite edge is dT/dx of a node; the momentum of each */
+        for (int k = 0; k < 3; k++) {
+            g[k] = f.mass * f.q * (f.r[k] / (2 * f.l) - f.q * f.m[k] / (4 * f.l * f.l * f.l));
+            p[k] = -f.mass / 6 * f.q * f.m[k] / f.l;
+        }
         for (int a = 0; a < 3; a++) {
             vec3_cross(f.opposite[a], g, moment);
             for (int k = 0; by_x && k < 3; k++)
@@ -288,7 +256,9 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
                 put(force, opposite, D, item(dg_dx, i, D * D) + column);
             }
             for (int column = 0; dg_dv && column < D; column++) {
-                const flow d = by_velocity(&f, column % 3, column / 3 == opposite ? 0 : 0.5);
+                const double share = column / 3 == opposite ? 0 : 0.5; /* of the mean of both ends */
+                flow d = {.q = -share * f.m[column % 3]};
+                d.r[column % 3] = -share;
                 edge_force_change(&f, opposite, &d, force);
                 put(force, opposite, D, item(dg_dv, i, D * D) + column);
             }

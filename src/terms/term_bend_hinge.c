@@ -77,18 +77,6 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
 }
 
-static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, const int32_t triangle[2],
-                                double choice)
-{
-    const drape_material *material = cloth->material;
-    if (choice == STIFFNESS_REPORT)
-        return 2 / sqrt(3.0) * material->young_modulus * material->thickness * material->thickness *
-               material->thickness / 12;
-    double length = cloth->edge_length[edge];
-    return material->flexural_rigidity * length * length /
-           (cloth->triangle_area[triangle[0]] + cloth->triangle_area[triangle[1]]);
-}
-
 /* Altitudes and angles of LANES hinges from `first` on; lanes beyond the end repeat the last one. */
 typedef struct shapes {
     double altitude[2][LANES], theta[LANES];
@@ -116,7 +104,12 @@ static void set_hinge(const drape_cloth_view *cloth, const double *values, int32
         .count = 1, .nodes = 4, .rest_count = REST_PERIODIC, .node = node, .rest = rest};
     measure_shapes(&one, 0, cloth->rest, &s);
     memcpy(rest + REST_SHIFT, shift, 3 * sizeof *rest);
-    rest[REST_K] = element_stiffness(cloth, edge, triangle, values[PARAM_STIFFNESS]);
+    const drape_material *m = cloth->material;
+    const double length = cloth->edge_length[edge], h = m->thickness;
+    rest[REST_K] = values[PARAM_STIFFNESS] == STIFFNESS_REPORT
+                       ? 2 / sqrt(3.0) * m->young_modulus * h * h * h / 12
+                       : m->flexural_rigidity * length * length /
+                             (cloth->triangle_area[triangle[0]] + cloth->triangle_area[triangle[1]]);
     rest[REST_THETA0] = values[PARAM_REST] == REST_FLAT ? 0 : s.theta[0];
     rest[REST_ALTITUDE1] = s.altitude[0][0];
     rest[REST_ALTITUDE2] = s.altitude[1][0];

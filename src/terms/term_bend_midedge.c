@@ -154,12 +154,6 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
 
 /* ---- Building ---- */
 
-/* The sizes of the term on a cloth. */
-typedef struct sizes {
-    int64_t squares, links, parts;
-    int nodes; /* per element */
-} sizes;
-
 /* Whether a hinge of the patch is in one of its squares. */
 static bool is_linked(const drape_midedge *patch, int h)
 {
@@ -232,7 +226,8 @@ static int gather_nodes(const drape_cloth_view *cloth, const drape_midedge *patc
 static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
                             drape_term_builder *builder)
 {
-    sizes n = {.parts = cloth->hinge_count, .nodes = 3};
+    int64_t squares = 0, links = 0, parts = cloth->hinge_count;
+    int most = 3; /* nodes per element */
     bool shifted = false;
     drape_midedge patch;
     drape_status status = DRAPE_OK;
@@ -241,26 +236,26 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
         if (!drape_midedge_of(cloth, t, values, law, &patch))
             return drape_orthotropic_refuse(builder, t);
         const int nodes = gather_nodes(cloth, &patch, node);
-        n.nodes = nodes > n.nodes ? nodes : n.nodes;
-        n.squares += patch.rank;
+        most = nodes > most ? nodes : most;
+        squares += patch.rank;
         for (int h = 0; h < MIDEDGE_HINGES; h++) {
-            n.parts += is_own(&patch, h);
+            parts += is_own(&patch, h);
             shifted = shifted || patch.shifted[h];
         }
         for (int r = 0; r < patch.rank; r++)
             for (int h = 0; h < MIDEDGE_HINGES; h++)
-                n.links += patch.c[r][h] != 0;
+                links += patch.c[r][h] != 0;
         status = drape_term_check_cancel(builder, 4096);
     }
-    if (n.links > INT32_MAX || n.parts > INT32_MAX)
+    if (links > INT32_MAX || parts > INT32_MAX)
         return drape_term_refuse(builder, "the mesh is too large: %.0f angles in elements; at most %d",
-                                 (double)n.links, INT32_MAX);
-    const bool own = n.parts > cloth->hinge_count;
+                                 (double)links, INT32_MAX);
+    const bool own = parts > cloth->hinge_count;
     if (own)
         drape_term_anchor(builder);
-    status = status ? status : drape_term_reserve_nodes(builder, (int32_t)n.squares, n.nodes, REST_COUNT);
+    status = status ? status : drape_term_reserve_nodes(builder, (int32_t)squares, most, REST_COUNT);
     return status ? status
-                  : drape_term_reserve_parts(builder, (int32_t)n.parts, (int32_t)n.links,
+                  : drape_term_reserve_parts(builder, (int32_t)parts, (int32_t)links,
                                              !own      ? 0
                                              : shifted ? PART_COUNT
                                                        : CLAMP_COUNT);
@@ -274,32 +269,6 @@ static double min_altitude(const double *x0, const double *x1, const double *x2)
     vec3_sub(x2, x1, c);
     vec3_cross(a, b, n);
     return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
-}
-
-/* r of a clamped edge: in the plane of the triangle, across the edge and away from the apex. An edge that
- * is held in a plane may turn in it: a part of r along the edge would then come to lie across the sheet. */
-static void clamp_of(const drape_cloth_view *cloth, const drape_midedge *patch, int h, double r[3])
-{
-    const double *a = cloth->rest + 3 * (size_t)patch->node[h],
-                 *b = cloth->rest + 3 * (size_t)patch->node[(h + 1) % 3];
-    const double *apex = cloth->rest + 3 * (size_t)patch->node[(h + 2) % 3];
-    double edge[3];
-    vec3_sub(b, a, edge);
-    vec3_sub(a, apex, r);
-    vec3_add_scaled(-vec3_dot(r, edge) / vec3_dot(edge, edge), edge, r);
-}
-
-/* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no force to the
- * last bit. */
-static double rest_angle(const drape_cloth_view *cloth, const int32_t node[4], const double rest[PART_COUNT])
-{
-    static const int32_t same[LANES] = {0};
-    static const double flat = 0;
-    const drape_parts one = {.count = 1, .nodes = 4, .rest_count = PART_COUNT, .node = node, .rest = rest};
-    const drape_elements el = {.parts = &one};
-    double s[LANES];
-    measure_angles(&el, same, cloth->rest, &flat, s, NULL, NULL);
-    return s[0];
 }
 
 /* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next one that
@@ -318,31 +287,38 @@ static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch,
         if (!is_linked(patch, h))
             continue;
         sign[h] = part_nodes(cloth, patch, h, node);
-        if (clamped)
-            clamp_of(cloth, patch, h, rest + PART_R);
-        else if (!patch->shifted[h])
+        if (clamped) {
+            /* r of a clamped edge: in the plane of the triangle, across the edge and away from the apex.
+             * An edge that is held in a plane may turn in it: a part of r along the edge would then come
+             * to lie across the sheet. */
+            double *r = rest + PART_R;
+            const double *a = cloth->rest + 3 * (size_t)patch->node[h],
+                         *b = cloth->rest + 3 * (size_t)patch->node[(h + 1) % 3];
+            const double *apex = cloth->rest + 3 * (size_t)patch->node[(h + 2) % 3];
+            double edge[3];
+            vec3_sub(b, a, edge);
+            vec3_sub(a, apex, r);
+            vec3_add_scaled(-vec3_dot(r, edge) / vec3_dot(edge, edge), edge, r);
+        } else if (!patch->shifted[h])
             part[h] = hinge_at(cloth, patch->edge[h]);
         for (int k = 0; !clamped && k < 4; k++)
             memcpy(rest + PART_SHIFT + 3 * k, patch->at_rest[drape_patch_hinge[h][k]], 3 * sizeof *rest);
-        theta[h] = rest_angle(cloth, node, rest);
+        /* The angle of a part at rest, by the function that steps use, so that a cloth at rest has no
+         * force to the last bit. */
+        static const int32_t same[LANES] = {0};
+        static const double flat = 0;
+        const drape_parts one = {
+            .count = 1, .nodes = 4, .rest_count = PART_COUNT, .node = node, .rest = rest};
+        const drape_elements el = {.parts = &one};
+        double s[LANES];
+        measure_angles(&el, same, cloth->rest, &flat, s, NULL, NULL);
+        theta[h] = s[0];
         for (int k = 0; !clamped && k < 4; k++)
             memcpy(rest + PART_SHIFT + 3 * k, patch->shift[drape_patch_hinge[h][k]], 3 * sizeof *rest);
         drape_term_set_part(builder, part[h], node, rest);
         if (clamped && cloth->edge_turn)
             drape_term_turn_part(builder, part[h], cloth->edge_turn[patch->edge[h]]);
     }
-}
-
-/* The squares of a patch are found from products of stiffnesses, which must not underflow. */
-static drape_status check_law(const double law[9], drape_term_builder *builder)
-{
-    for (int i = 0; i < 3; i++)
-        if (!(law[4 * i] >= LEAST_STIFFNESS))
-            return drape_term_refuse(builder,
-                                     "a bending stiffness of %g N m is too small to be computed with; it is "
-                                     "at least %g N m",
-                                     law[4 * i], LEAST_STIFFNESS);
-    return DRAPE_OK;
 }
 
 /* The sliders of a square for each unit of its stiffness, and the share of that which is elastic. */
@@ -402,9 +378,14 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
     hysteresis slides;
-    drape_status status = check_law(law, builder);
-    if (!status)
-        status = hysteresis_of(values, law, builder, &slides);
+    /* The squares of a patch are found from products of stiffnesses, which must not underflow. */
+    for (int i = 0; i < 3; i++)
+        if (!(law[4 * i] >= LEAST_STIFFNESS))
+            return drape_term_refuse(builder,
+                                     "a bending stiffness of %g N m is too small to be computed with; it is "
+                                     "at least %g N m",
+                                     law[4 * i], LEAST_STIFFNESS);
+    drape_status status = hysteresis_of(values, law, builder, &slides);
     if (!status)
         status = reserve(cloth, values, law, builder);
     if (!status && slides.count > 0)
@@ -477,32 +458,6 @@ static double altitude_ratio(const drape_elements *el, int32_t element, const do
            drape_rest_of(el, REST_ALTITUDE, element);
 }
 
-/* The squares of a triangle follow each other. */
-static bool is_of_same_triangle(const drape_elements *el, int32_t element)
-{
-    const int32_t *n = el->node + (size_t)element * (size_t)el->nodes;
-    return element > 0 && memcmp(n, n - el->nodes, 3 * sizeof *n) == 0;
-}
-
-static void find_largest_turn(const drape_elements *el, const double *x, const double *internal,
-                              drape_fault *turned)
-{
-    const drape_parts *parts = el->parts;
-    for (int32_t i = 0; i < parts->count; i += LANES) {
-        int32_t part[LANES];
-        double s[LANES];
-        drape_lanes_elements(i, parts->count, part);
-        measure_angles(el, part, x, internal, s, NULL, NULL);
-        for (int l = 0; l < LANES; l++) {
-            const double turn = fabs(s[l] - internal[part[l]]);
-            if (turn > turned->value) {
-                turned->value = turn;
-                turned->element = parts->element[parts->user[parts->first_user[part[l]]]];
-            }
-        }
-    }
-}
-
 /* A collapsed altitude is reported first: the angles of a collapsed triangle are meaningless. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
@@ -512,7 +467,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
     drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
                           -1, 0, DRAPE_MAX_TURN};
     for (int32_t e = 0; e < el->count; e++) {
-        if (is_of_same_triangle(el, e))
+        const int32_t *n = el->node + (size_t)e * (size_t)el->nodes;
+        if (e > 0 &&
+            memcmp(n, n - el->nodes, 3 * sizeof *n) == 0) /* squares of a triangle follow each other */
             continue;
         const double ratio = altitude_ratio(el, e, x);
         if (ratio < low.value &&
@@ -521,7 +478,20 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
             low.element = e;
         }
     }
-    find_largest_turn(el, x, internal, &turned);
+    const drape_parts *parts = el->parts;
+    for (int32_t i = 0; i < parts->count; i += LANES) {
+        int32_t part[LANES];
+        double s[LANES];
+        drape_lanes_elements(i, parts->count, part);
+        measure_angles(el, part, x, internal, s, NULL, NULL);
+        for (int l = 0; l < LANES; l++) {
+            const double turn = fabs(s[l] - internal[part[l]]);
+            if (turn > turned.value) {
+                turned.value = turn;
+                turned.element = parts->element[parts->user[parts->first_user[part[l]]]];
+            }
+        }
+    }
     *fault = low.value < low.limit ? low : turned;
     return low.value < low.limit || turned.value > turned.limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }

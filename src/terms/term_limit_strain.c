@@ -52,17 +52,6 @@ static double onset_of(const double *values)
 
 /* ---- Building ---- */
 
-static double mean_length(const drape_spring_set *set, int32_t count)
-{
-    double sum = 0;
-    for (int32_t i = 0; i < count; i++) {
-        int32_t pair[2];
-        drape_spring_pair(set, i, pair);
-        sum += drape_spring_rest_length(set->cloth, pair);
-    }
-    return sum / count;
-}
-
 /* Such that a single edge can carry the weight of the sheet at y = 0.46, where b' = 1. */
 static double stiffness_of(const drape_spring_set *set, int32_t count, const double *values)
 {
@@ -72,8 +61,14 @@ static double stiffness_of(const drape_spring_set *set, int32_t count, const dou
         return values[PARAM_STIFFNESS];
     for (int32_t i = 0; i < cloth->node_count; i++)
         mass += cloth->node_mass[i];
+    double lengths = 0;
+    for (int32_t i = 0; i < count; i++) {
+        int32_t pair[2];
+        drape_spring_pair(set, i, pair);
+        lengths += drape_spring_rest_length(cloth, pair);
+    }
     return fmax(cloth->material->membrane_stiffness,
-                mass * vec3_norm(cloth->gravity) / (width * mean_length(set, count)));
+                mass * vec3_norm(cloth->gravity) / (width * (lengths / count)));
 }
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -143,12 +138,11 @@ static void one(const drape_elements *el, int32_t element, const double *x, doub
         g[3 + i] = force * n[i];
         g[i] = -g[3 + i];
     }
-    for (int i = 0; hess && i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double block = (k * b.curve - across) * n[i] * n[j] + across * (i == j);
-            hess[6 * i + j] = hess[6 * (3 + i) + 3 + j] = block;
-            hess[6 * i + 3 + j] = hess[6 * (3 + i) + j] = -block;
-        }
+    double block[9];
+    for (int i = 0; hess && i < 9; i++)
+        block[i] = (k * b.curve - across) * n[i / 3] * n[i % 3] + across * (i % 4 == 0);
+    if (hess)
+        drape_pair_block(block, hess);
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

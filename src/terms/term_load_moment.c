@@ -200,18 +200,10 @@ static void to_nodes(double scale, const double by[6], double g[9])
     }
 }
 
-static void put_gradient(const twist *w, double scale, double *g)
+static void put_hessian(const twist *w, double scale, double *hess)
 {
-    double p[3], q[3], by[6] = {0};
-    find_factors(w, p, q);
-    add_first(&w->t, p, by);
-    add_first(&w->n, q, by);
-    to_nodes(scale / w->square, by, g);
-}
-
-/* Adds C S'' - S C'' to h, by (d, g). */
-static void add_curvature(const twist *w, double h[6][6])
-{
+    double h[6][6] = {{0}}, rows[6][9], column[6], full[9];
+    /* Adds C S'' - S C'' to h, by (d, g). */
     double p[3], q[3], b[3];
     find_factors(w, p, q);
     add_second(&w->t, p, h);
@@ -220,11 +212,7 @@ static void add_curvature(const twist *w, double h[6][6])
     add_second(&w->n, q, h);
     across(&w->n, q, b);
     add_normal_second(b, h);
-}
-
-/* Adds (2 S C (C' C'^T - S' S'^T) + (S^2 - C^2) (S' C'^T + C' S'^T))/(S^2 + C^2) to h, by (d, g). */
-static void add_products(const twist *w, double h[6][6])
-{
+    /* Adds (2 S C (C' C'^T - S' S'^T) + (S^2 - C^2) (S' C'^T + C' S'^T))/(S^2 + C^2) to h, by (d, g). */
     const double same = 2 * w->sine * w->cosine / w->square,
                  mixed = (w->sine * w->sine - w->cosine * w->cosine) / w->square,
                  back[3] = {-w->t0[0], -w->t0[1], -w->t0[2]};
@@ -237,13 +225,6 @@ static void add_products(const twist *w, double h[6][6])
         for (int l = 0; l < 6; l++)
             h[k][l] += same * (by_cosine[k] * by_cosine[l] - by_sine[k] * by_sine[l]) +
                        mixed * (by_sine[k] * by_cosine[l] + by_cosine[k] * by_sine[l]);
-}
-
-static void put_hessian(const twist *w, double scale, double *hess)
-{
-    double h[6][6] = {{0}}, rows[6][9], column[6], full[9];
-    add_curvature(w, h);
-    add_products(w, h);
     for (int k = 0; k < 6; k++)
         to_nodes(scale / w->square, h[k], rows[k]);
     for (int l = 0; l < 9; l++) {
@@ -292,8 +273,13 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
         const double psi = measure_twist(el, first + i, x, &w);
         if (e)
             e[i] = moment * drape_nearest_branch(psi, internal[first + i]);
-        if (g)
-            put_gradient(&w, moment, g + 9 * (size_t)i);
+        if (g) {
+            double p[3], q[3], by[6] = {0};
+            find_factors(&w, p, q);
+            add_first(&w.t, p, by);
+            add_first(&w.n, q, by);
+            to_nodes(moment / w.square, by, g + 9 * (size_t)i);
+        }
         if (hess)
             put_hessian(&w, moment, hess + 81 * (size_t)i);
     }

@@ -24,15 +24,6 @@ static const drape_param params[2 * BRANCHES] = {
     FURTHER("fraction_4", "time_4"),
 };
 
-/* The part of the stiffness that does not relax. */
-static double lasting(const double *values)
-{
-    double part = 1;
-    for (int i = 0; i < BRANCHES; i++)
-        part -= isnan(values[2 * i]) ? 0 : values[2 * i];
-    return part;
-}
-
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     (void)cloth;
@@ -53,7 +44,10 @@ static void law(const double *values, int32_t count, const double *k, const doub
                 double *energy)
 {
     (void)rate, (void)dforce_drate;
-    const double relaxing = 1 - fmax(0, lasting(values));
+    double lasting = 1; /* the part of the stiffness that does not relax */
+    for (int i = 0; i < BRANCHES; i++)
+        lasting -= isnan(values[2 * i]) ? 0 : values[2 * i];
+    const double relaxing = 1 - fmax(0, lasting);
     for (int32_t i = 0; i < count; i++) {
         const double c = relaxing * k[i];
         force[i] -= c * strain[i];

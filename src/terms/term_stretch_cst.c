@@ -33,11 +33,6 @@ enum {
 
 static const drape_param params[DRAPE_STRAIN_LIST] = {DRAPE_STRAIN_PARAMS};
 
-static double measure_of(const double w[3], const double d1[3], const double d2[3])
-{
-    return 0.5 * (w[0] * vec3_dot(d1, d1) + w[2] * vec3_dot(d2, d2)) + w[1] * vec3_dot(d1, d2);
-}
-
 /* The blocks of x1 and x2 are multiples W of the identity; those of x0 make the sums zero. */
 static void hessian(const double w[3], double *ddq)
 {
@@ -144,9 +139,12 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             drape_strain_weights(l + 3 * r, flat, w);
             tension_part(l + 3 * r, plus);
             drape_strain_weights(plus, flat, tension);
-            drape_term_set(builder, 3 * t + r, node,
-                           (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), area, w[0], w[1],
-                                                      w[2], tension[0], tension[1], tension[2]});
+            drape_term_set(
+                builder, 3 * t + r, node,
+                (const double[REST_COUNT]){k[r] * area,
+                                           0.5 * (w[0] * vec3_dot(d1, d1) + w[2] * vec3_dot(d2, d2)) +
+                                               w[1] * vec3_dot(d1, d2),
+                                           area, w[0], w[1], w[2], tension[0], tension[1], tension[2]});
         }
     }
     return status;

@@ -23,7 +23,6 @@
  */
 #include "base/elementary.h"
 #include "base/pi.h"
-#include "base/reason.h"
 #include "base/vec3.h"
 #include "sparse/project.h"
 #include "terms/curve.h"
@@ -168,32 +167,6 @@ static double column_of(const double w[2], const double d1[3], const double d2[3
     return length;
 }
 
-static void tension_strain(double length, const double n[3], strain *s)
-{
-    s->value = length - 1;
-    for (int i = 0; i < 3; i++) {
-        s->by[0][i] = n[i];
-        for (int j = 0; j < 3; j++)
-            s->block[0][3 * i + j] = length > 0 ? ((i == j) - n[i] * n[j]) / length : 0;
-    }
-}
-
-static void shear_strain(double p, const double n[3], double r, const double m[3], strain *s)
-{
-    const double sine = vec3_dot(n, m), a = p > 0 ? 1 / p : 0, b = r > 0 ? 1 / r : 0;
-    s->value = sine;
-    for (int i = 0; i < 3; i++) {
-        s->by[0][i] = a * (m[i] - sine * n[i]);
-        s->by[1][i] = b * (n[i] - sine * m[i]);
-        for (int j = 0; j < 3; j++) {
-            const double same = i == j, nm = n[i] * m[j], mn = m[i] * n[j];
-            s->block[0][3 * i + j] = a * a * (3 * sine * n[i] * n[j] - nm - mn - sine * same);
-            s->block[1][3 * i + j] = a * b * (same - n[i] * n[j] - m[i] * m[j] + sine * nm);
-            s->block[2][3 * i + j] = b * b * (3 * sine * m[i] * m[j] - nm - mn - sine * same);
-        }
-    }
-}
-
 static bool is_shear(const drape_elements *el, int32_t element)
 {
     return drape_rest_of(el, REST_SHEAR, element) != 0;
@@ -211,10 +184,28 @@ static void strain_of(const drape_elements *el, int32_t element, const double *x
     }
     sides(el, element, x, d1, d2);
     const double p = column_of(w[0] + 1, d1, d2, n);
-    if (is_shear(el, element))
-        shear_strain(p, n, column_of(w[1] + 1, d1, d2, m), m, s);
-    else
-        tension_strain(p, n, s);
+    if (is_shear(el, element)) {
+        const double r = column_of(w[1] + 1, d1, d2, m);
+        const double sine = vec3_dot(n, m), a = p > 0 ? 1 / p : 0, b = r > 0 ? 1 / r : 0;
+        s->value = sine;
+        for (int i = 0; i < 3; i++) {
+            s->by[0][i] = a * (m[i] - sine * n[i]);
+            s->by[1][i] = b * (n[i] - sine * m[i]);
+            for (int j = 0; j < 3; j++) {
+                const double same = i == j, nm = n[i] * m[j], mn = m[i] * n[j];
+                s->block[0][3 * i + j] = a * a * (3 * sine * n[i] * n[j] - nm - mn - sine * same);
+                s->block[1][3 * i + j] = a * b * (same - n[i] * n[j] - m[i] * m[j] + sine * nm);
+                s->block[2][3 * i + j] = b * b * (3 * sine * m[i] * m[j] - nm - mn - sine * same);
+            }
+        }
+    } else {
+        s->value = p - 1;
+        for (int i = 0; i < 3; i++) {
+            s->by[0][i] = n[i];
+            for (int j = 0; j < 3; j++)
+                s->block[0][3 * i + j] = p > 0 ? ((i == j) - n[i] * n[j]) / p : 0;
+        }
+    }
 }
 
 /* The measure of a strain: in compression the strain itself; shear is odd. */
@@ -318,11 +309,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
-                           .what = "area / rest area",
-                           .limit = DRAPE_MIN_RATIO};
     const int32_t every = el->params[PARAM_FRICTION] > 0 ? RESPONSES : FRICTION; /* of one triangle */
-    return drape_check_ratios(el, x, before, every, ratio_of, fault);
+    return drape_check_ratios(el, x, before, every, ratio_of, DRAPE_REASON_AREA_COLLAPSE, "area / rest area",
+                              fault);
 }
 
 const drape_term_ops drape_term_stretch_curve = {

@@ -14,7 +14,6 @@
  * A periodic edge has an element on each of its sides, each with what its own triangle gives, or half of the
  * stiffness of the report.
  */
-#include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/terms.h"
 
@@ -57,18 +56,6 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     return status;
 }
 
-/* ddq = [P -P; -P P] with P = (I - u u')/(L |e|) */
-static void hessian(const double u[3], double inverse_length, double length, double *ddq)
-{
-    double scale = inverse_length / length;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double p = scale * ((i == j) - u[i] * u[j]);
-            ddq[6 * i + j] = ddq[6 * (3 + i) + 3 + j] = p;
-            ddq[6 * i + 3 + j] = ddq[6 * (3 + i) + j] = -p;
-        }
-}
-
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq)
 {
@@ -86,8 +73,11 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
             dq[6 * i + 3 + k] = u[k] * inverse[i];
             dq[6 * i + k] = -dq[6 * i + 3 + k];
         }
+        double p[9];
+        for (int k = 0; ddq && k < 9; k++)
+            p[k] = inverse[i] / length * ((k % 4 == 0) - u[k / 3] * u[k % 3]);
         if (ddq)
-            hessian(u, inverse[i], length, ddq + 36 * (size_t)i);
+            drape_pair_block(p, ddq + 36 * (size_t)i);
     }
 }
 
@@ -113,10 +103,8 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_EDGE_COLLAPSE),
-                           .what = "edge length / rest length",
-                           .limit = DRAPE_MIN_RATIO};
-    return drape_check_ratios(el, x, before, 1, ratio_of, fault);
+    return drape_check_ratios(el, x, before, 1, ratio_of, DRAPE_REASON_EDGE_COLLAPSE,
+                              "edge length / rest length", fault);
 }
 
 const drape_term_ops drape_term_stretch_edge = {

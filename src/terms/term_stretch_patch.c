@@ -115,20 +115,6 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
 }
 
-/* W of all nodes from those of nodes 1 ... 5. */
-static void complete(const double *w, double full[NODES * NODES])
-{
-    memset(full, 0, NODES * NODES * sizeof *full);
-    for (int a = 1; a < NODES; a++)
-        for (int b = 1; b < NODES; b++) {
-            const double v = w[place(a - 1, b - 1)];
-            full[NODES * a + b] = v;
-            full[NODES * a] -= v;
-            full[b] -= v;
-            full[0] += v;
-        }
-}
-
 /* The positive part of W if the force is a tension, the rest of it if it is a compression. */
 static void positive(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq)
@@ -140,7 +126,16 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
             const double plus = drape_rest_of(el, REST_POSITIVE + k, first + i);
             w[k] = force[i] > 0 ? plus : drape_rest_of(el, REST_W + k, first + i) - plus;
         }
-        complete(w, full);
+        /* W of all nodes from those of nodes 1 ... 5. */
+        memset(full, 0, NODES * NODES * sizeof *full);
+        for (int a = 1; a < NODES; a++)
+            for (int b = 1; b < NODES; b++) {
+                const double v = w[place(a - 1, b - 1)];
+                full[NODES * a + b] = v;
+                full[NODES * a] -= v;
+                full[b] -= v;
+                full[0] += v;
+            }
         memset(to, 0, 9 * NODES * NODES * sizeof *to);
         for (int a = 0; a < NODES; a++)
             for (int b = 0; b < NODES; b++)
@@ -207,10 +202,10 @@ static void fit_nodes(const drape_patch *patch, const int extra[3], fit *out)
     }
 }
 
-/* The nodes around the triangle: their places in the patch, each once. */
-static int list_candidates(const drape_patch *patch, int candidate[CANDIDATES])
+/* By the apices of the neighbours, and the best of the others for those that are missing. */
+static void fit_patch(const drape_patch *patch, fit *best)
 {
-    int count = 0;
+    int candidate[CANDIDATES] = {0}, own = 0, count = 0; /* places in the patch around the triangle */
     for (int n = 3; n < DRAPE_PATCH_NODES; n++) {
         int k = 0;
         while (k < n && patch->node[k] != patch->node[n])
@@ -218,14 +213,6 @@ static int list_candidates(const drape_patch *patch, int candidate[CANDIDATES])
         if (patch->node[n] >= 0 && k == n)
             candidate[count++] = n;
     }
-    return count;
-}
-
-/* By the apices of the neighbours, and the best of the others for those that are missing. */
-static void fit_patch(const drape_patch *patch, fit *best)
-{
-    int candidate[CANDIDATES] = {0}, own = 0;
-    const int count = list_candidates(patch, candidate);
     while (own < count && candidate[own] < 6)
         own++;
     fit_nodes(patch, candidate, best);

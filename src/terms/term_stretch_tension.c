@@ -30,32 +30,6 @@ static void columns(double w[2][3], const double *x, double p[3], double q[3])
     }
 }
 
-static drape_status set_triangle(const drape_cloth_view *cloth, const double *values, const double *c,
-                                 int32_t t, drape_term_builder *builder)
-{
-    const int32_t *node = cloth->triangle + 3 * (size_t)t;
-    const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
-                                     cloth->rest + 3 * (size_t)node[2]};
-    double axes[6], flat[6], x[9], p[3], q[3];
-    if (!drape_orthotropic_frame(values, corner, c, axes, flat))
-        return drape_orthotropic_refuse(builder, t);
-    const double twice = flat[2] * flat[5] - flat[3] * flat[4];
-    double w[2][3] = {{0, flat[5] / twice, -flat[3] / twice}, {0, -flat[4] / twice, flat[2] / twice}};
-    for (int i = 0; i < 9; i++)
-        x[i] = corner[i / 3][i % 3];
-    columns(w, x, p, q);
-    drape_term_set(builder, t, node,
-                   (const double[REST_COUNT]){[REST_AREA] = cloth->triangle_area[t],
-                                              [REST_P1] = w[0][1],
-                                              [REST_P2] = w[0][2],
-                                              [REST_Q1] = w[1][1],
-                                              [REST_Q2] = w[1][2],
-                                              [REST_11] = vec3_dot(p, p),
-                                              [REST_22] = vec3_dot(q, q),
-                                              [REST_12] = vec3_dot(p, q)});
-    return DRAPE_OK;
-}
-
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
@@ -64,8 +38,28 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         return status ? status : DRAPE_E_MEMORY;
     drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
                           cloth->material->poisson_ratio, c);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++)
-        status = set_triangle(cloth, values, c, t, builder);
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
+        const int32_t *node = cloth->triangle + 3 * (size_t)t;
+        const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
+                                         cloth->rest + 3 * (size_t)node[2]};
+        double axes[6], flat[6], x[9], p[3], q[3];
+        if (!drape_orthotropic_frame(values, corner, c, axes, flat))
+            return drape_orthotropic_refuse(builder, t);
+        const double twice = flat[2] * flat[5] - flat[3] * flat[4];
+        double w[2][3] = {{0, flat[5] / twice, -flat[3] / twice}, {0, -flat[4] / twice, flat[2] / twice}};
+        for (int i = 0; i < 9; i++)
+            x[i] = corner[i / 3][i % 3];
+        columns(w, x, p, q);
+        drape_term_set(builder, t, node,
+                       (const double[REST_COUNT]){[REST_AREA] = cloth->triangle_area[t],
+                                                  [REST_P1] = w[0][1],
+                                                  [REST_P2] = w[0][2],
+                                                  [REST_Q1] = w[1][1],
+                                                  [REST_Q2] = w[1][2],
+                                                  [REST_11] = vec3_dot(p, p),
+                                                  [REST_22] = vec3_dot(q, q),
+                                                  [REST_12] = vec3_dot(p, q)});
+    }
     return status;
 }
 

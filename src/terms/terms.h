@@ -4,6 +4,7 @@
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 
+#include "base/reason.h"
 #include "base/registry.h"
 #include "base/vec3.h"
 
@@ -36,6 +37,17 @@ static inline double drape_pair_length(const drape_elements *el, int32_t element
     return vec3_norm(d);
 }
 
+/* The 6 x 6 block of two nodes that act on each other in opposite directions, by their difference only, from
+ * the 3 x 3 one of a node on itself: [B -B; -B B]. */
+static inline void drape_pair_block(const double block[9], double *out)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            out[6 * i + j] = out[6 * (3 + i) + 3 + j] = block[3 * i + j];
+            out[6 * i + 3 + j] = out[6 * (3 + i) + j] = -block[3 * i + j];
+        }
+}
+
 /* How a load or the wind varies in time; the library multiplies by it. One value each, after all others. */
 #define DRAPE_TERM_HISTORY_PARAM                                                                             \
     DRAPE_TEXT("history", "name of a history of the scene, by which the load, or the wind, is multiplied",   \
@@ -64,11 +76,11 @@ static inline bool drape_fell(double ratio, double before)
     return ratio < before - 1e-12;
 }
 
-/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ... An element below the
- * limit is ignored if the step did not lower its ratio; with before = NULL no element is ignored. fault has
- * reason, what and limit on entry. */
+/* For the check of a term: finds the lowest ratio, of what it is, of the elements 0, every, 2 every ... An
+ * element below DRAPE_MIN_RATIO is ignored if the step did not lower its ratio; with before = NULL none is. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
-                                int32_t every, drape_ratio *ratio_of, drape_fault *fault);
+                                int32_t every, drape_ratio *ratio_of, drape_reason reason, const char *what,
+                                drape_fault *fault);
 
 #endif
