@@ -8,7 +8,6 @@
 
 #include "base/vec3.h"
 #include "mesh/mesh.h"
-#include "mesh/order.h"
 
 #define MAX_EARS 256  /* corners of a polygon; cutting ears takes their square */
 #define SHORTER  .998 /* ratio of squared lengths below which a diagonal is shorter than another */
@@ -271,17 +270,6 @@ static drape_status merge_uvs(drape_context *ctx, drape_faces *f)
     return DRAPE_OK;
 }
 
-/* ---- All ---- */
-
-static void drop(drape_arena *arena, drape_faces *f)
-{
-    void *const arrays[] = {f->first,    f->node, f->uv_of,         f->uv,
-                            f->material, f->name, f->material_file, f->corner};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        drape_arena_release(arena, arrays[i]);
-    *f = (drape_faces){0};
-}
-
 drape_status drape_faces_complete(drape_context *ctx, drape_mesh *mesh)
 {
     drape_faces *f = &mesh->faces;
@@ -301,7 +289,11 @@ drape_status drape_faces_complete(drape_context *ctx, drape_mesh *mesh)
         has_uvs = has_uvs || all;
     }
     if (!has_uvs && f->material_count == 0 && f->count == mesh->triangle_count) {
-        drop(&mesh->arena, f);
+        void *const arrays[] = {f->first,    f->node, f->uv_of,         f->uv,
+                                f->material, f->name, f->material_file, f->corner};
+        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+            drape_arena_release(&mesh->arena, arrays[i]);
+        *f = (drape_faces){0};
         return DRAPE_OK;
     }
     if (has_uvs)

@@ -73,24 +73,6 @@ static double squared_length(const double *q)
     return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
 }
 
-/* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
- * mesh. */
-static void read_weights(drape_gltf *g, const char *owner, const json_t *object, drape_gltf_node *n)
-{
-    const json_t *mesh = drape_gltf_item(g, "meshes", n->mesh),
-                 *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
-    const size_t count = json_array_size(json_object_get(primitive, "targets"));
-    if (count == 0)
-        return;
-    n->weight_count = (int32_t)count;
-    n->weight = drape_gltf_take(g, count, sizeof *n->weight);
-    n->now_weight = drape_gltf_take(g, count, sizeof *n->now_weight);
-    if (g->status)
-        return;
-    drape_gltf_numbers(g, owner, mesh, "weights", count, n->weight);
-    drape_gltf_numbers(g, owner, object, "weights", count, n->weight);
-}
-
 static void read_node(const drape_gltf_scene *s, int32_t index)
 {
     drape_gltf *g = s->gltf;
@@ -115,7 +97,20 @@ static void read_node(const drape_gltf_scene *s, int32_t index)
     n->local = drape_gltf_map_of(matrix);
     if (!(squared_length(n->rest + ROTATION) > LEAST_TURN))
         FAIL(g, "%s: a rotation must not be 0", owner);
-    read_weights(g, owner, object, n);
+    /* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
+     * mesh. */
+    const json_t *mesh = drape_gltf_item(g, "meshes", n->mesh),
+                 *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
+    const size_t count = json_array_size(json_object_get(primitive, "targets"));
+    if (count > 0) {
+        n->weight_count = (int32_t)count;
+        n->weight = drape_gltf_take(g, count, sizeof *n->weight);
+        n->now_weight = drape_gltf_take(g, count, sizeof *n->now_weight);
+        if (!g->status) {
+            drape_gltf_numbers(g, owner, mesh, "weights", count, n->weight);
+            drape_gltf_numbers(g, owner, object, "weights", count, n->weight);
+        }
+    }
     snprintf(owner, sizeof owner, "node %d: \"children\"", (int)index);
     json_array_foreach(json_object_get(object, "children"), i, child)
     {

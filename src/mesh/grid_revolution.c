@@ -32,36 +32,28 @@ static const drape_param params[PARAM_COUNT] = {
     [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
 };
 
-static drape_status check_meridian(drape_context *ctx, const char *pointer, const double *values)
-{
-    const double chord = drape_hypot(values[BOTTOM] - values[TOP], values[HEIGHT]);
-    if (!(chord > 0))
-        return drape_fail_below(ctx, pointer, "height", "0 m, and both circles have the radius %g m",
-                                values[TOP]);
-    if (values[ARC] == 0 || values[ARC] >= chord / 2 * (1 - 1e-12))
-        return DRAPE_OK;
-    return drape_fail_below(ctx, pointer, "arc_radius",
-                            "%g m; it is at least half the distance of the circles, %g m", values[ARC],
-                            chord / 2);
-}
-
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
     static const bool falling[][2][2] = {
         [ALTERNATING] = {{true, false}, {false, true}}, [PARALLEL] = {{true, true}, {true, true}}};
     const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
+    const double radian = DRAPE_PI / 180, run = values[BOTTOM] - values[TOP], drop = values[HEIGHT],
+                 chord = drape_hypot(run, drop), arc = values[ARC],
+                 middle[2] = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2};
     drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status)
-        status = check_meridian(ctx, pointer, values);
+    if (!status && !(chord > 0))
+        status = drape_fail_below(ctx, pointer, "height", "0 m, and both circles have the radius %g m",
+                                  values[TOP]);
+    if (!status && arc != 0 && !(arc >= chord / 2 * (1 - 1e-12)))
+        status =
+            drape_fail_below(ctx, pointer, "arc_radius",
+                             "%g m; it is at least half the distance of the circles, %g m", arc, chord / 2);
     if (!status)
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
     /* The points of a meridian are middle + sine of an angle times along + (cosine - least) times out, as
      * radius and y, at angles from -half to half; a straight one has half = 0. */
-    const double radian = DRAPE_PI / 180, run = values[BOTTOM] - values[TOP], drop = values[HEIGHT],
-                 chord = drape_hypot(run, drop), arc = values[ARC],
-                 middle[2] = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2};
     double along[2] = {run, -drop}, out[2] = {0}, half = 0, least = 0;
     if (arc > 0 && chord > 0) {
         const double depth = sqrt(fmax(0, arc * arc - chord * chord / 4));

@@ -1,5 +1,6 @@
 /* mesh.c: makes a mesh from its def, stage by stage, and frees it. */
 #include "mesh/mesh.h"
+#include "base/vec3.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -72,56 +73,33 @@ drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-static drape_status check_one_source(drape_context *ctx, const char *pointer, const drape_mesh_def *def)
+/* Areas of triangles |(x1 - x0) x (x2 - x0)| / 2, lengths of edges, and the area lumped to each node, a third of
+ * each triangle around it (so that these sum to the area of the sheet). */
+drape_status drape_mesh_measure(drape_mesh *mesh)
 {
-    const bool arrays = def->positions || def->triangles;
-    const int count = (def->grid.type != NULL) + (def->file != NULL) + arrays;
-    if (count == 1)
-        return DRAPE_OK;
-    return drape_fail_at(
-        ctx, DRAPE_E_ARGUMENT, pointer, "%d sources%s%s%s; a mesh has exactly one of grid, file, positions",
-        count, def->grid.type ? ", grid" : "", def->file ? ", file" : "", arrays ? ", positions" : "");
-}
-
-static drape_status take_from_source(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
-                                     const char *folder, drape_mesh *mesh)
-{
-    if (def->grid.type)
-        return drape_mesh_from_grid(ctx, pointer, &def->grid, mesh);
-    if (def->file)
-        return drape_mesh_from_file(ctx, pointer, folder, def->file, mesh);
-    return drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count, def->triangles,
-                                  def->triangle_count, mesh);
-}
-
-/* Positions are also checked before the transform, because a rotation spreads one coordinate that is not a
- * number to all three. */
-static drape_status place_nodes(drape_context *ctx, const char *pointer, const drape_mesh_source *source,
-                                const drape_mesh_def *def, drape_mesh *mesh)
-{
-    char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s/transform", pointer);
-    const drape_mesh_source transform = {.pointer = place};
-
-    const drape_status status = drape_mesh_validate_positions(ctx, source, mesh);
-    if (status)
-        return status;
-    drape_mesh_transform(mesh, def->scale, def->rotate, def->translate);
-    return drape_mesh_validate_positions(ctx, &transform, mesh);
-}
-
-static drape_status complete(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
-{
-    drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
-    status = status ? status : drape_check_cancel(ctx);
-    if (!status)
-        status = drape_mesh_connect(ctx, source, mesh);
-    status = status ? status : drape_check_cancel(ctx);
-    if (!status)
-        status = drape_mesh_validate_nodes(ctx, source, mesh);
-    if (!status)
-        status = drape_mesh_measure(mesh);
-    return status;
+    drape_arena *arena = &mesh->arena;
+    mesh->triangle_area = drape_arena_take(arena, (size_t)mesh->triangle_count, sizeof *mesh->triangle_area);
+    mesh->edge_length = drape_arena_take(arena, (size_t)mesh->edge_count, sizeof *mesh->edge_length);
+    mesh->node_area = drape_arena_take(arena, (size_t)mesh->node_count, sizeof *mesh->node_area);
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        double u[3], v[3], normal[3];
+        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], u);
+        vec3_sub(mesh->x + 3 * (size_t)n[2], mesh->x + 3 * (size_t)n[0], v);
+        vec3_cross(u, v, normal);
+        mesh->triangle_area[triangle] = vec3_norm(normal) / 2;
+        for (int k = 0; k < 3; k++)
+            mesh->node_area[n[k]] += mesh->triangle_area[triangle] / 3;
+    }
+    for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
+        const int32_t *n = mesh->edge + 2 * (size_t)edge;
+        double along[3];
+        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], along);
+        mesh->edge_length[edge] = vec3_norm(along);
+    }
+    return DRAPE_OK;
 }
 
 /* The place of its faults, in a buffer of that size, and the file. */
@@ -138,14 +116,29 @@ drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const dra
     const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
 
     *mesh = (drape_mesh){0};
-    drape_status status = check_one_source(ctx, pointer, def);
+    const bool arrays = def->positions || def->triangles;
+    const int count = (def->grid.type != NULL) + (def->file != NULL) + arrays;
+    if (count != 1)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
+                             "%d sources%s%s%s; a mesh has exactly one of grid, file, positions", count,
+                             def->grid.type ? ", grid" : "", def->file ? ", file" : "",
+                             arrays ? ", positions" : "");
+    drape_status status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
     if (!status)
-        status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
-    if (!status)
-        status = take_from_source(ctx, pointer, def, folder, mesh);
+        status = def->grid.type ? drape_mesh_from_grid(ctx, pointer, &def->grid, mesh)
+                 : def->file    ? drape_mesh_from_file(ctx, pointer, folder, def->file, mesh)
+                                : drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count,
+                                                         def->triangles, def->triangle_count, mesh);
     status = status ? status : drape_check_cancel(ctx);
+    /* Positions are also checked before the transform, because a rotation spreads one coordinate that is not a
+     * number to all three. */
     if (!status)
-        status = place_nodes(ctx, pointer, &source, def, mesh);
+        status = drape_mesh_validate_positions(ctx, &source, mesh);
+    if (!status) {
+        drape_mesh_transform(mesh, def->scale, def->rotate, def->translate);
+        snprintf(place, sizeof place, "%s/transform", pointer);
+        status = drape_mesh_validate_positions(ctx, &(drape_mesh_source){.pointer = place}, mesh);
+    }
     if (status)
         drape_mesh_free(mesh);
     return status;
@@ -158,7 +151,15 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
     const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
     drape_status status = drape_mesh_place(ctx, pointer, def, folder, mesh);
     if (!status)
-        status = complete(ctx, &source, mesh);
+        status = drape_mesh_validate_triangles(ctx, &source, mesh);
+    status = status ? status : drape_check_cancel(ctx);
+    if (!status)
+        status = drape_mesh_connect(ctx, &source, mesh);
+    status = status ? status : drape_check_cancel(ctx);
+    if (!status)
+        status = drape_mesh_validate_nodes(ctx, &source, mesh);
+    if (!status)
+        status = drape_mesh_measure(mesh);
     if (status)
         drape_mesh_free(mesh);
     return status;

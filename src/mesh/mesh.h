@@ -121,6 +121,12 @@ drape_status drape_mesh_validate_shapes(drape_context *ctx, const drape_mesh_sou
  * may have either orientation. */
 drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh);
 
+/* Returns the numbers 0 .. count - 1 in the order of their keys; equal keys keep the order of their numbers.
+ * The key of item i is key[i * parts] ... key[i * parts + parts - 1], compared from its first part; each part
+ * is in 0 .. limit - 1. The result and the workspace are allocated in the arena. Returns NULL with a message
+ * if memory is out. */
+int32_t *drape_order_by_keys(drape_arena *arena, const int32_t *key, int parts, int32_t count, int32_t limit);
+
 /* The number of the edge between two nodes, of edges in ascending order; -1: there is none. */
 int32_t drape_edge_between(const int32_t *edge, int32_t edge_count, int32_t a, int32_t b);
 

@@ -4,7 +4,6 @@
 
 #include "base/vec3.h"
 #include "mesh/mesh.h"
-#include "mesh/order.h"
 #include "mesh/remedy.h"
 
 #define MAX_COORDINATE 1e9   /* [m]: beyond this, neighbouring doubles are more than 1e-7 m apart */
@@ -36,17 +35,6 @@ drape_status drape_mesh_validate_indices(drape_context *ctx, const drape_mesh_so
                 return drape_mesh_fail(ctx, source, 0,
                                        "triangle %d (nodes %d %d %d): there is no node %d, range is 0 to %d",
                                        triangle, n[0], n[1], n[2], n[k], mesh->node_count - 1);
-    }
-    return DRAPE_OK;
-}
-
-static drape_status check_corners(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
-{
-    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
-        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
-        if (n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
-            return drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice", triangle,
-                                   n[0], n[1], n[2]);
     }
     return DRAPE_OK;
 }
@@ -125,8 +113,12 @@ drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_
                                            const drape_mesh *mesh)
 {
     drape_status status = drape_mesh_validate_indices(ctx, source, mesh);
-    if (!status)
-        status = check_corners(ctx, source, mesh);
+    for (int32_t triangle = 0; !status && triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        if (n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
+            status = drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice",
+                                     triangle, n[0], n[1], n[2]);
+    }
     if (!status)
         status = check_shapes(ctx, source, mesh, true);
     if (!status)

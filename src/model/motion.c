@@ -126,40 +126,6 @@ typedef struct course {
 static void pose_of(const drape_motion *motion, int32_t collider, double t, double within, bool rates,
                     drape_collider_pose *pose);
 
-/* Where a collider has a pin that it carries. */
-static void position_on_ride(const drape_motion *motion, const drape_ride *ride, double t, double x[3])
-{
-    const drape_collider *collider = &motion->model->colliders[ride->collider];
-    drape_collider_pose pose;
-    double corner[9];
-    pose_of(motion, ride->collider, t, t, false, &pose);
-    memcpy(x, ride->own, 3 * sizeof *x);
-    if (ride->triangle >= 0) {
-        drape_deformation_corners(&motion->deformation[ride->collider],
-                                  collider->shape.triangle + 3 * (size_t)ride->triangle, t, corner);
-        drape_ride_point(ride, corner, x);
-    }
-    drape_pose_point(&pose, x, x);
-}
-
-static void velocity_on_ride(const drape_motion *motion, const drape_ride *ride, double t, double within,
-                             double v[3])
-{
-    const drape_collider *collider = &motion->model->colliders[ride->collider];
-    drape_collider_pose pose;
-    double corner[9], rate[9], own[3], own_velocity[3] = {0};
-    drape_motion_pose(motion, ride->collider, t, within, &pose);
-    memcpy(own, ride->own, sizeof own);
-    if (ride->triangle >= 0) {
-        const int32_t *triangle = collider->shape.triangle + 3 * (size_t)ride->triangle;
-        drape_deformation_corners(&motion->deformation[ride->collider], triangle, t, corner);
-        drape_deformation_corner_velocities(&motion->deformation[ride->collider], triangle, t, within, rate);
-        drape_ride_point(ride, corner, own);
-        drape_ride_velocity(ride, corner, rate, own_velocity);
-    }
-    drape_pose_point_velocity(&pose, own, own_velocity, v);
-}
-
 /* Paths of pins hold positions, not displacements, so that a pin reaches exactly the position that the host
  * gave. */
 static void position_on(const course *c, double t, double x[3])
@@ -169,7 +135,17 @@ static void position_on(const course *c, double t, double x[3])
         return;
     }
     if (c->ride) {
-        position_on_ride(c->motion, c->ride, t, x);
+        const drape_collider *collider = &c->motion->model->colliders[c->ride->collider];
+        drape_collider_pose pose;
+        double corner[9];
+        pose_of(c->motion, c->ride->collider, t, t, false, &pose);
+        memcpy(x, c->ride->own, 3 * sizeof *x);
+        if (c->ride->triangle >= 0) {
+            drape_deformation_corners(&c->motion->deformation[c->ride->collider],
+                                      collider->shape.triangle + 3 * (size_t)c->ride->triangle, t, corner);
+            drape_ride_point(c->ride, corner, x);
+        }
+        drape_pose_point(&pose, x, x);
         return;
     }
     memset(x, 0, 3 * sizeof *x);
@@ -190,7 +166,20 @@ static void velocity_on(const course *c, double t, double within, double v[3])
         return;
     }
     if (c->ride) {
-        velocity_on_ride(c->motion, c->ride, t, within, v);
+        const drape_collider *collider = &c->motion->model->colliders[c->ride->collider];
+        drape_collider_pose pose;
+        double corner[9], rate[9], own[3], own_velocity[3] = {0};
+        drape_motion_pose(c->motion, c->ride->collider, t, within, &pose);
+        memcpy(own, c->ride->own, sizeof own);
+        if (c->ride->triangle >= 0) {
+            const int32_t *triangle = collider->shape.triangle + 3 * (size_t)c->ride->triangle;
+            drape_deformation_corners(&c->motion->deformation[c->ride->collider], triangle, t, corner);
+            drape_deformation_corner_velocities(&c->motion->deformation[c->ride->collider], triangle, t,
+                                                within, rate);
+            drape_ride_point(c->ride, corner, own);
+            drape_ride_velocity(c->ride, corner, rate, own_velocity);
+        }
+        drape_pose_point_velocity(&pose, own, own_velocity, v);
         return;
     }
     memset(v, 0, 3 * sizeof *v);
@@ -827,18 +816,6 @@ static void archive_path(drape_path *path, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
 }
 
-static void archive_turn(drape_turn_path *turn, drape_archive *a)
-{
-    drape_archive_doubles(a, turn->from, 9);
-    drape_archive_doubles(a, turn->turn, 3);
-    for (int i = 0; i < 2; i++)
-        drape_archive_doubles(a, turn->rate[i], 3);
-    if (drape_archive_has_read(a) &&
-        !(drape_all_finite(turn->from, 9) && drape_all_finite(turn->turn, 3) &&
-          drape_all_finite(turn->rate[0], 3) && drape_all_finite(turn->rate[1], 3)))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a rotation that is not finite");
-}
-
 static bool is_ride(const drape_motion *motion, const drape_ride *ride)
 {
     const drape_model *m = motion->model;
@@ -907,8 +884,18 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);
-        if (motion->collider_path[c].given && drape_archive_good(a))
-            archive_turn(&motion->collider_turn[c], a);
+        if (motion->collider_path[c].given && drape_archive_good(a)) {
+            drape_turn_path *turn = &motion->collider_turn[c];
+            drape_archive_doubles(a, turn->from, 9);
+            drape_archive_doubles(a, turn->turn, 3);
+            for (int i = 0; i < 2; i++)
+                drape_archive_doubles(a, turn->rate[i], 3);
+            if (drape_archive_has_read(a) && !(drape_all_finite(turn->from, 9) &&
+                                               drape_all_finite(turn->turn, 3) &&
+                                               drape_all_finite(turn->rate[0], 3) &&
+                                               drape_all_finite(turn->rate[1], 3)))
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a rotation that is not finite");
+        }
         archive_placement(&motion->collider_placed[c], a);
         drape_deformation_archive(&motion->deformation[c], a);
     }

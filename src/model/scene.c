@@ -609,33 +609,29 @@ static const override *override_beside(const drape_scene *scene, const char *poi
     return o;
 }
 
-/* The place of a value is that where it was set last, or else its place in the text. For a value that is in
- * neither, it is the override that set something beside it or, as the value is missing, its nearest ancestor
- * in the text. */
-static void place_of(const drape_scene *scene, const char *pointer, char *place, size_t size)
-{
-    size_t offset, line, column;
-    const override *o = scene->last;
-    while (o && !leads_to(o->pointer, pointer))
-        o = o->before;
-    bool found = drape_text_find(scene->text, pointer, &offset);
-    if (!o && !found)
-        o = override_beside(scene, pointer);
-    drape_text_place(scene->text, offset, &line, &column);
-    if (!*pointer)
-        snprintf(place, size, "%s", scene->name);
-    else if (o)
-        snprintf(place, size, "%s: %s", scene->name, o->shown);
-    else
-        snprintf(place, size, "%s:%zu:%zu", scene->name, line, column);
-}
-
 void drape_scene_locate_fault(drape_scene *scene)
 {
     drape_context *ctx = scene->ctx;
     char place[DRAPE_MESSAGE_SIZE / 2];
     locale_t old = drape_locale_enter();
-    place_of(scene, ctx->pointer, place, sizeof place);
+    /* The place of a value is that where it was set last, or else its place in the text. For a value that
+     * is in neither, it is the override that set something beside it or, as the value is missing, its
+     * nearest ancestor in the text. */
+    const size_t size = sizeof place;
+    size_t offset, line, column;
+    const override *o = scene->last;
+    while (o && !leads_to(o->pointer, ctx->pointer))
+        o = o->before;
+    bool found = drape_text_find(scene->text, ctx->pointer, &offset);
+    if (!o && !found)
+        o = override_beside(scene, ctx->pointer);
+    drape_text_place(scene->text, offset, &line, &column);
+    if (!*ctx->pointer)
+        snprintf(place, size, "%s", scene->name);
+    else if (o)
+        snprintf(place, size, "%s: %s", scene->name, o->shown);
+    else
+        snprintf(place, size, "%s:%zu:%zu", scene->name, line, column);
     int used = snprintf(ctx->message, sizeof ctx->message, "%s: %s%s", place, ctx->pointer,
                         *ctx->pointer ? ": " : "");
     snprintf(ctx->message + used, sizeof ctx->message - (size_t)used, "%s", ctx->text);

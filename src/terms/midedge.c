@@ -136,18 +136,20 @@ static void find_phi(patch *p, int i)
 
 /* ---- K ---- */
 
-/* The derivatives of K = (K11, K22, 2 K12) by the angle of each hinge, b (9 x 3), and by the slopes of the
- * free edges, f. Returns the number of free edges. */
-static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HINGES], double f[9])
+static void make_squares(patch *p, const double law[9])
 {
-    int count = 0;
+    const double area = p->cloth->triangle_area[p->triangle];
+    double c[9], b[3 * MIDEDGE_HINGES], f[9];
+    /* The derivatives of K = (K11, K22, 2 K12) by the angle of each hinge, b (9 x 3), and by the slopes
+     * of the free edges, f. */
+    int free_edges = 0;
     memset(b, 0, 3 * MIDEDGE_HINGES * sizeof *b);
     for (int i = 0; i < 3; i++) {
         double nu[2];
         const double w = outward(p, i, nu) / area;
         const double column[3] = {w * nu[0] * nu[0], w * nu[1] * nu[1], w * 2 * nu[0] * nu[1]};
         if (p->out->free[i]) {
-            memcpy(f + 3 * count++, column, sizeof column);
+            memcpy(f + 3 * free_edges++, column, sizeof column);
             continue;
         }
         for (int j = 0; j < MIDEDGE_HINGES; j++) {
@@ -156,14 +158,6 @@ static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HING
                 b[3 * j + r] += column[r] * (own + p->c[i][j]);
         }
     }
-    return count;
-}
-
-static void make_squares(patch *p, const double law[9])
-{
-    const double area = p->cloth->triangle_area[p->triangle];
-    double c[9], b[3 * MIDEDGE_HINGES], f[9];
-    const int free_edges = gather_columns(p, area, b, f);
     drape_midedge *out = p->out;
     out->rank = 3 - free_edges;
     if (out->rank == 0)

@@ -77,7 +77,7 @@ static inline bool drape_fell(double ratio, double before)
 }
 
 /* For the check of a term: finds the lowest ratio, of what it is, of the elements 0, every, 2 every ... An
- * element below DRAPE_MIN_RATIO is ignored if the step did not lower its ratio; with before = NULL none is. */
+ * element below DRAPE_MIN_RATIO is ignored if the step did not lower its ratio; if before is NULL none is. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
                                 int32_t every, drape_ratio *ratio_of, drape_reason reason, const char *what,

@@ -36,7 +36,7 @@ def sources(files, *tops):
 
 
 def folder_of(path):
-    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/entries.c.in -> src"""
+    """src/mesh/mesh.c -> mesh; include/drape/drape.h -> drape; src/entries.c.in -> src"""
     return path.split("/")[-2]
 
 
