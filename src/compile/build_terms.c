@@ -372,14 +372,14 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
 }
 
 /* A term whose dashpots are all 0 has no damping, so its rates are not needed. */
-static const double *own_damping(const drape_term *term)
+static void find_damping(drape_model *model, drape_term *term)
 {
     const drape_elements *el = &term->elements;
     const double *c = term->ops->damped ? el->rest + 2 * (size_t)el->count : NULL;
-    for (int32_t e = 0; c && e < el->count; e++)
-        if (c[e] != 0)
-            return c;
-    return NULL;
+    for (int32_t e = 0; c && !term->damping && e < el->count; e++)
+        term->damping = c[e] != 0 ? c : NULL;
+    model->has_laws = model->has_laws || term->damping;
+    model->has_dissipation = model->has_dissipation || term->damping;
 }
 
 /* Builds the term that joins the nodes of a seam. */
@@ -412,9 +412,8 @@ static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_
                                ops->entry.name, drape_status_name(status));
     if (!status)
         status = check_elements(&builder);
-    builder.term->damping = status || !ops->measure ? NULL : own_damping(builder.term);
-    model->has_laws = model->has_laws || builder.term->damping;
-    model->has_dissipation = model->has_dissipation || builder.term->damping;
+    if (!status)
+        find_damping(model, builder.term);
     return status;
 }
 
@@ -453,9 +452,7 @@ static drape_status connect_laws(drape_model *model, int32_t c)
         term->law_count = cloth->law_count;
         term->branches = cloth->branches;
         term->branch_count = cloth->branch_count;
-        term->damping = own_damping(term);
-        model->has_laws = model->has_laws || term->damping;
-        model->has_dissipation = model->has_dissipation || term->damping;
+        find_damping(model, term);
     }
     model->has_laws = model->has_laws || cloth->law_count > 0;
     snprintf(pointer, sizeof pointer, "/cloth/%d/terms", (int)c);

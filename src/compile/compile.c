@@ -104,26 +104,6 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
     return status;
 }
 
-/* Assigns every cloth its range of nodes and triangles. */
-static drape_status count_all(drape_model *model)
-{
-    int64_t nodes = 0, triangles = 0, edges = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        model->cloths[c].first_node = (int32_t)nodes;
-        model->cloths[c].first_triangle = (int32_t)triangles;
-        nodes += model->cloths[c].mesh.node_count;
-        triangles += model->cloths[c].mesh.triangle_count;
-        edges += model->cloths[c].mesh.edge_count;
-        if (nodes > DRAPE_MAX_NODES)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
-                                 "the cloths have more than %d nodes together", DRAPE_MAX_NODES);
-    }
-    model->node_count = (int32_t)nodes;
-    model->triangle_count = (int32_t)triangles;
-    model->edge_count = (int32_t)edges;
-    return DRAPE_OK;
-}
-
 static void copy_numbers(int32_t *to, const int32_t *from, size_t count, int32_t first)
 {
     for (size_t i = 0; i < count; i++)
@@ -182,8 +162,20 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
         status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_cloth(model, (int32_t)c, def);
         model->cloth_count = (int32_t)c + 1; /* count an unfinished cloth, too, so that it is freed */
     }
-    if (!status)
-        status = count_all(model);
+    int64_t nodes = 0, triangles = 0, edges = 0;
+    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+        model->cloths[c].first_node = (int32_t)nodes;
+        model->cloths[c].first_triangle = (int32_t)triangles;
+        nodes += model->cloths[c].mesh.node_count;
+        triangles += model->cloths[c].mesh.triangle_count;
+        edges += model->cloths[c].mesh.edge_count;
+        if (nodes > DRAPE_MAX_NODES)
+            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
+                                   "the cloths have more than %d nodes together", DRAPE_MAX_NODES);
+    }
+    model->node_count = (int32_t)nodes;
+    model->triangle_count = (int32_t)triangles;
+    model->edge_count = (int32_t)edges;
     return status ? status : gather(model);
 }
 

@@ -70,24 +70,16 @@ static const drape_entry untangle_entry = {
         "such cloth begins as it is",
     DRAPE_PARAMS(drape_untangle_params)};
 
-const drape_registry drape_untangle_registry = {"untangle",
-                                                "untangles",
-                                                "Untangling",
-                                                "\"untangle\" of the scene",
-                                                (const drape_entry *[]){&untangle_entry, NULL},
-                                                NULL};
-const drape_registry drape_contact_registry = {"contact",
-                                               "contacts",
-                                               "Contact",
-                                               "\"contact\" of the scene",
-                                               (const drape_entry *[]){&contact_entry, NULL},
-                                               NULL};
-const drape_registry drape_self_contact_registry = {"self-contact",
-                                                    "self_contacts",
-                                                    "Self-contact",
-                                                    "\"self_contact\" of the scene",
-                                                    (const drape_entry *[]){&self_contact_entry, NULL},
-                                                    NULL};
+static const drape_entry *const untangle_entries[] = {&untangle_entry, NULL};
+const drape_registry drape_untangle_registry = {
+    "untangle", "untangles", "Untangling", "\"untangle\" of the scene", untangle_entries, NULL};
+static const drape_entry *const contact_entries[] = {&contact_entry, NULL};
+const drape_registry drape_contact_registry = {
+    "contact", "contacts", "Contact", "\"contact\" of the scene", contact_entries, NULL};
+static const drape_entry *const self_contact_entries[] = {&self_contact_entry, NULL};
+const drape_registry drape_self_contact_registry = {"self-contact",       "self_contacts",
+                                                    "Self-contact",       "\"self_contact\" of the scene",
+                                                    self_contact_entries, NULL};
 
 void drape_untangle_values(const drape_model_untangle *untangle, double values[DRAPE_UNTANGLE_PARAM_COUNT])
 {

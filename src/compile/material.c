@@ -69,12 +69,9 @@ const drape_entry drape_material_entry = {
     .name = "material",
     .summary = "a sheet; give exactly one of density, areal_density, total_mass",
     DRAPE_PARAMS(params)};
-const drape_registry drape_material_registry = {"material",
-                                                "materials",
-                                                "Material",
-                                                "\"material\" of a cloth",
-                                                (const drape_entry *[]){&drape_material_entry, NULL},
-                                                NULL};
+static const drape_entry *const material_entries[] = {&drape_material_entry, NULL};
+const drape_registry drape_material_registry = {
+    "material", "materials", "Material", "\"material\" of a cloth", material_entries, NULL};
 
 static drape_status total_mass(drape_context *ctx, const char *pointer, const double *values, double area,
                                double *mass)

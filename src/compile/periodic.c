@@ -542,6 +542,14 @@ static drape_status find_twins(const drape_model *m, const drape_term *term, boo
     return DRAPE_OK;
 }
 
+/* who: what the cloth of periodic edges has beside them. */
+static drape_status refuse_cloth(const drape_model *m, int32_t cloth, const char *who, const char *why)
+{
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)cloth);
+    return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer, "%s %s", who, why);
+}
+
 static bool is_periodic(const drape_model *m, const drape_cloth *cloth)
 {
     for (int32_t i = 0; i < cloth->mesh.node_count; i++)
@@ -550,49 +558,26 @@ static bool is_periodic(const drape_model *m, const drape_cloth *cloth)
     return false;
 }
 
-static drape_status check_term(const drape_model *m, const drape_term *term)
-{
-    char pointer[64];
-    bool twins;
-    if (term->ops->periodic)
-        return DRAPE_OK;
-    drape_status status = find_twins(m, term, &twins);
-    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)term->cloth);
-    if (!status && twins)
-        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
-                               "%s has elements along both edges, which are one edge: they would count twice",
-                               term->ops->entry.name);
-    if (!status && reaches_over_edges(m, term))
-        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
-                               "%s couples nodes across edges of triangles, but would not across the "
-                               "periodic edge",
-                               term->ops->entry.name);
-    return status;
-}
-
 static drape_status check_terms(const drape_model *m)
 {
     drape_status status = DRAPE_OK;
     for (int32_t i = 0; !status && i < m->term_count; i++) {
         const drape_term *term = &m->terms[i];
-        if (term->seam < 0 && !term->ops->law && !term->ops->external &&
-            is_periodic(m, &m->cloths[term->cloth]))
-            status = check_term(m, term);
+        bool twins;
+        if (term->seam >= 0 || term->ops->law || term->ops->external || term->ops->periodic ||
+            !is_periodic(m, &m->cloths[term->cloth]))
+            continue;
+        status = find_twins(m, term, &twins);
+        if (!status && twins)
+            status =
+                refuse_cloth(m, term->cloth, term->ops->entry.name,
+                             "has elements along both edges, which are one edge: they would count twice");
+        if (!status && reaches_over_edges(m, term))
+            status = refuse_cloth(
+                m, term->cloth, term->ops->entry.name,
+                "couples nodes across edges of triangles, but would not across the periodic edge");
     }
     return status;
-}
-
-static drape_status check_contact(const drape_model *m)
-{
-    for (int32_t c = 0; m->contact.self && c < m->cloth_count; c++)
-        if (is_periodic(m, &m->cloths[c])) {
-            char pointer[64];
-            snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)c);
-            return drape_fail_at(
-                m->ctx, DRAPE_E_ARGUMENT, pointer,
-                "cloth with periodic edges has no self_contact: it would not touch its images");
-        }
-    return DRAPE_OK;
 }
 
 /* ---- Couplings ---- */
@@ -669,8 +654,10 @@ drape_status drape_compile_images(drape_model *m, const drape_scene_def *def)
         status = check_motions(m);
     if (!status)
         status = check_clamps(m);
-    if (!status)
-        status = check_contact(m);
+    for (int32_t c = 0; !status && m->contact.self && c < m->cloth_count; c++)
+        if (is_periodic(m, &m->cloths[c]))
+            status = refuse_cloth(m, c, "cloth with periodic edges",
+                                  "has no self_contact: it would not touch its images");
     if (!status)
         status = check_terms(m);
     return status ? status : couple_images(m);

@@ -66,25 +66,6 @@ static drape_status bind_cloth(drape_model *model, int32_t c, const drape_scene_
     return status;
 }
 
-static drape_status bind_cloths(drape_model *model, const drape_scene_def *def)
-{
-    double *normals = NULL;
-    drape_status status = DRAPE_OK;
-    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
-        const drape_mesh_def *given = &def->cloths[c].render_mesh.mesh;
-        if (!given->grid.type && !given->file && !given->positions && !given->triangles)
-            continue;
-        if (!normals) {
-            normals = drape_alloc(model->ctx, (size_t)model->node_count, 3 * sizeof *normals);
-            drape_model_normals(model, model->rest, normals);
-        }
-        status = normals ? bind_cloth(model, c, def, normals) : DRAPE_E_MEMORY;
-        model->surface.bound = true;
-    }
-    drape_free(model->ctx, normals);
-    return status;
-}
-
 /* Lists the mesh that frames show of each cloth, and where its nodes and triangles are. */
 static drape_status list_cloths(drape_model *model)
 {
@@ -140,7 +121,20 @@ static drape_status gather(drape_model *model)
 
 drape_status drape_compile_render_meshes(drape_model *model, const drape_scene_def *def)
 {
-    drape_status status = bind_cloths(model, def);
+    double *normals = NULL;
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+        const drape_mesh_def *given = &def->cloths[c].render_mesh.mesh;
+        if (!given->grid.type && !given->file && !given->positions && !given->triangles)
+            continue;
+        if (!normals) {
+            normals = drape_alloc(model->ctx, (size_t)model->node_count, 3 * sizeof *normals);
+            drape_model_normals(model, model->rest, normals);
+        }
+        status = normals ? bind_cloth(model, c, def, normals) : DRAPE_E_MEMORY;
+        model->surface.bound = true;
+    }
+    drape_free(model->ctx, normals);
     if (!status)
         status = list_cloths(model);
     return status ? status : gather(model);

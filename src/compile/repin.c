@@ -7,22 +7,6 @@
 
 #include <string.h>
 
-static drape_status copy_terms(drape_model *model)
-{
-    const drape_term *from = model->terms;
-    model->terms = drape_arena_take(&model->arena, (size_t)model->term_count, sizeof *model->terms);
-    if (!model->terms)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < model->term_count; i++) {
-        drape_term *term = &model->terms[i];
-        *term = from[i];
-        term->block = NULL;
-        if (term->elements.parts)
-            term->elements.parts = &term->parts;
-    }
-    return DRAPE_OK;
-}
-
 static drape_status number(drape_model *model, const uint8_t *pinned)
 {
     const drape_model *base = model->base;
@@ -77,7 +61,15 @@ drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base,
     model->base = base;
     model->arena = drape_arena_of(ctx);
     model->ctx = ctx;
-    drape_status status = copy_terms(model);
+    model->terms = drape_arena_take(&model->arena, (size_t)model->term_count, sizeof *model->terms);
+    drape_status status = drape_arena_status(&model->arena);
+    for (int32_t i = 0; !status && i < model->term_count; i++) {
+        drape_term *term = &model->terms[i];
+        *term = base->terms[i];
+        term->block = NULL;
+        if (term->elements.parts)
+            term->elements.parts = &term->parts;
+    }
     if (!status)
         status = number(model, pinned ? pinned : base->pinned);
     if (!status && mass)

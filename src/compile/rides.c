@@ -53,25 +53,6 @@ static drape_status attach(drape_model *model, const drape_motion *motion, const
     return status;
 }
 
-static drape_status attach_all(drape_model *model, const drape_scene_def *def, const drape_motion *motion)
-{
-    const drape_pin *pin = model->pins;
-    drape_status status = DRAPE_OK;
-    for (size_t c = 0; c < def->cloth_count; c++)
-        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++, pin++) {
-            const drape_pin_def *from = &def->cloths[c].pins[p];
-            int32_t collider = -1;
-            char pointer[64];
-            if (!from->attach && from->triangle < 0)
-                continue;
-            snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu", c, p);
-            status = find_carrier(model, pointer, from, &collider);
-            if (!status)
-                status = attach(model, motion, pin, collider, from->triangle);
-        }
-    return status;
-}
-
 drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
 {
     drape_motion *motion = NULL;
@@ -89,8 +70,19 @@ drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
     drape_arena scratch = drape_arena_of(model->ctx);
     drape_status status = drape_motion_create(&scratch, model, &motion); /* of the colliders */
     model->ride = ride;
-    if (!status)
-        status = attach_all(model, def, motion);
+    const drape_pin *pin = model->pins;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++, pin++) {
+            const drape_pin_def *from = &def->cloths[c].pins[p];
+            int32_t collider = -1;
+            char pointer[64];
+            if (!from->attach && from->triangle < 0)
+                continue;
+            snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu", c, p);
+            status = find_carrier(model, pointer, from, &collider);
+            if (!status)
+                status = attach(model, motion, pin, collider, from->triangle);
+        }
     drape_arena_free(&scratch);
     return status;
 }

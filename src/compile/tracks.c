@@ -77,21 +77,6 @@ static bool share_axis(const drape_turn_key *a, const drape_turn_key *b, double 
     return vec3_norm(across) < 1e-9;
 }
 
-/* The steady turn from one key to the next. */
-static void turn_between(const drape_turn_key *a, const drape_turn_key *b, const double next[9],
-                         drape_turn *turn)
-{
-    double between[9], vector[3];
-    if (share_axis(a, b, turn->axis, &turn->degrees))
-        return;
-    drape_rotation_between(next, turn->rotation, between);
-    drape_rotation_log(between, vector);
-    turn->degrees = vec3_norm(vector) * (180 / DRAPE_PI);
-    memcpy(turn->axis, vector, sizeof turn->axis);
-    if (turn->degrees > 0)
-        normalise(turn->axis, 3);
-}
-
 drape_status drape_compile_turns(drape_model *model, const char *pointer, const drape_turn_key *keys,
                                  size_t key_count, drape_turns *turns)
 {
@@ -126,8 +111,18 @@ drape_status drape_compile_turns(drape_model *model, const char *pointer, const 
             drape_rotation_of_quaternion(q, turns->keys[k].rotation);
         }
     }
-    for (size_t k = 0; k + 1 < key_count; k++)
-        turn_between(&keys[k], &keys[k + 1], turns->keys[k + 1].rotation, &turns->keys[k]);
+    for (size_t k = 0; k + 1 < key_count; k++) { /* the steady turn from one key to the next */
+        drape_turn *turn = &turns->keys[k];
+        double between[9], vector[3];
+        if (share_axis(&keys[k], &keys[k + 1], turn->axis, &turn->degrees))
+            continue;
+        drape_rotation_between(turn[1].rotation, turn->rotation, between);
+        drape_rotation_log(between, vector);
+        turn->degrees = vec3_norm(vector) * (180 / DRAPE_PI);
+        memcpy(turn->axis, vector, sizeof turn->axis);
+        if (turn->degrees > 0)
+            normalise(turn->axis, 3);
+    }
     if (drape_turns_fastest(turns) > DRAPE_MAX_SPIN)
         return drape_fail_below(model->ctx, pointer, "turns",
                                 "%.6g rad/s is not allowed; colliders and pins turn by at most %g rad/s",

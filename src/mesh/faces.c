@@ -89,19 +89,6 @@ static bool is_inside(const polygon *p, int a)
     return vec3_dot(one, other) > 0;
 }
 
-static void divide_quadrilateral(polygon *p)
-{
-    const bool inside[2] = {is_inside(p, 0), is_inside(p, 1)};
-    const bool shorter = squared_distance(p, 1, 3) < SHORTER * squared_distance(p, 0, 2);
-    if (inside[0] == inside[1] ? shorter : inside[1]) {
-        put_triangle(p, 0, 1, 3);
-        put_triangle(p, 1, 2, 3);
-    } else {
-        put_triangle(p, 0, 1, 2);
-        put_triangle(p, 0, 2, 3);
-    }
-}
-
 /* Whether the corners that remain, before i, i and after i, turn to the left about the normal. */
 static bool turns_left(const polygon *p, const int *ring, int count, int i, const double *normal)
 {
@@ -196,9 +183,17 @@ static drape_status divide(drape_mesh *mesh)
         status = drape_check_cancel_after(mesh->arena.ctx,
                                           16 * (size_t)(count <= MAX_EARS ? count * count : count));
         p.corner = f->first[i];
-        if (count == 4)
-            divide_quadrilateral(&p);
-        else if (count > 4 && count <= MAX_EARS)
+        if (count == 4) {
+            const bool inside[2] = {is_inside(&p, 0), is_inside(&p, 1)};
+            const bool shorter = squared_distance(&p, 1, 3) < SHORTER * squared_distance(&p, 0, 2);
+            if (inside[0] == inside[1] ? shorter : inside[1]) {
+                put_triangle(&p, 0, 1, 3);
+                put_triangle(&p, 1, 2, 3);
+            } else {
+                put_triangle(&p, 0, 1, 2);
+                put_triangle(&p, 0, 2, 3);
+            }
+        } else if (count > 4 && count <= MAX_EARS)
             cut_ears(&p, (int)count);
         else
             for (int32_t k = 2; k < count; k++)

@@ -97,8 +97,8 @@ static void read_node(const drape_gltf_scene *s, int32_t index)
     n->local = drape_gltf_map_of(matrix);
     if (!(squared_length(n->rest + ROTATION) > LEAST_TURN))
         FAIL(g, "%s: a rotation must not be 0", owner);
-    /* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of the
-     * mesh. */
+    /* As many weights as the first primitive of its mesh has morph targets; the node's own replace those of
+     * the mesh. */
     const json_t *mesh = drape_gltf_item(g, "meshes", n->mesh),
                  *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
     const size_t count = json_array_size(json_object_get(primitive, "targets"));

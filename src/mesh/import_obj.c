@@ -164,18 +164,6 @@ static drape_status read_polygon(obj_reader *reader)
     return DRAPE_OK;
 }
 
-/* A file may have several of these statements. */
-static void read_file_name(obj_reader *reader)
-{
-    const drape_word name = rest_of_line(&reader->text);
-    if (name.length == 0)
-        return;
-    if (reader->file_size > 0)
-        reader->file[reader->file_size++] = '\n';
-    for (size_t i = 0; i < name.length; i++)
-        reader->file[reader->file_size++] = name.start[i] == '\n' ? ' ' : name.start[i];
-}
-
 static drape_status read_statements(obj_reader *reader)
 {
     drape_status status = DRAPE_OK;
@@ -189,9 +177,16 @@ static drape_status read_statements(obj_reader *reader)
             read_uv(reader);
         else if (drape_word_is(word, "usemtl"))
             reader->material[reader->materials++] = rest_of_line(&reader->text);
-        else if (drape_word_is(word, "mtllib"))
-            read_file_name(reader);
-        else if (drape_word_is(word, "f"))
+        else if (drape_word_is(word, "mtllib")) {
+            /* A file may have several of these statements. */
+            const drape_word name = rest_of_line(&reader->text);
+            if (name.length != 0) {
+                if (reader->file_size > 0)
+                    reader->file[reader->file_size++] = '\n';
+                for (size_t i = 0; i < name.length; i++)
+                    reader->file[reader->file_size++] = name.start[i] == '\n' ? ' ' : name.start[i];
+            }
+        } else if (drape_word_is(word, "f"))
             status = read_polygon(reader);
         status = status ? status : drape_check_cancel_after(reader->ctx, 64);
     } while (!status && drape_text_next_line(&reader->text));

@@ -392,22 +392,6 @@ static void read_uv(ply_reader *reader, ply_type type, double *uv)
         *uv = NAN;
 }
 
-/* Texture coordinates of the corners of the last face. They may come before its corners, so that they are
- * read after both: returns to the list. */
-static void read_corner_uvs(ply_reader *reader)
-{
-    drape_faces *faces = &reader->mesh->faces;
-    const size_t first = (size_t)faces->first[reader->faces - 1], last = reader->corners;
-    const drape_text after = reader->text;
-    reader->text = reader->list;
-    for (size_t c = first; c < last && reader->list_count == 2 * (int64_t)(last - first); c++) {
-        faces->uv_of[c] = (int32_t)c;
-        for (size_t k = 0; k < 2; k++)
-            read_uv(reader, reader->list_type, &faces->uv[2 * c + k]);
-    }
-    reader->text = after;
-}
-
 static drape_status read_list(ply_reader *reader, const ply_property *property)
 {
     double length = 0;
@@ -476,8 +460,20 @@ static drape_status read_item(ply_reader *reader)
     for (int i = 0; i < reader->element->property_count && !status; i++)
         status = read_property_value(reader, &property[i]);
     if (!status && !reader->counting && reader->has_role[CORNER_UVS] &&
-        drape_word_is(reader->element->name, "face"))
-        read_corner_uvs(reader);
+        drape_word_is(reader->element->name, "face")) {
+        /* Texture coordinates of the corners of the last face. They may come before its corners, so that
+         * they are read after both: returns to the list. */
+        drape_faces *faces = &reader->mesh->faces;
+        const size_t first = (size_t)faces->first[reader->faces - 1], last = reader->corners;
+        const drape_text after = reader->text;
+        reader->text = reader->list;
+        for (size_t c = first; c < last && reader->list_count == 2 * (int64_t)(last - first); c++) {
+            faces->uv_of[c] = (int32_t)c;
+            for (size_t k = 0; k < 2; k++)
+                read_uv(reader, reader->list_type, &faces->uv[2 * c + k]);
+        }
+        reader->text = after;
+    }
     if (status || reader->format != ASCII)
         return status;
     drape_word word;

@@ -73,8 +73,8 @@ drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* Areas of triangles |(x1 - x0) x (x2 - x0)| / 2, lengths of edges, and the area lumped to each node, a third of
- * each triangle around it (so that these sum to the area of the sheet). */
+/* Areas of triangles |(x1 - x0) x (x2 - x0)| / 2, lengths of edges, and the area lumped to each node, a third
+ * of each triangle around it (so that these sum to the area of the sheet). */
 drape_status drape_mesh_measure(drape_mesh *mesh)
 {
     drape_arena *arena = &mesh->arena;
@@ -130,8 +130,8 @@ drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const dra
                                 : drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count,
                                                          def->triangles, def->triangle_count, mesh);
     status = status ? status : drape_check_cancel(ctx);
-    /* Positions are also checked before the transform, because a rotation spreads one coordinate that is not a
-     * number to all three. */
+    /* Positions are also checked before the transform, because a rotation spreads one coordinate that is not
+     * a number to all three. */
     if (!status)
         status = drape_mesh_validate_positions(ctx, &source, mesh);
     if (!status) {

@@ -662,28 +662,6 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
     motion->collider_path[collider] = path;
 }
 
-bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
-{
-    return drape_deformation_moves(&motion->deformation[collider]);
-}
-
-void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
-                         const double *v)
-{
-    drape_deformation_send(&motion->deformation[collider], t, span, x, v);
-}
-
-void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x)
-{
-    drape_deformation_points(&motion->deformation[collider], t, x);
-}
-
-void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
-                                   double *v)
-{
-    drape_deformation_velocities(&motion->deformation[collider], t, within, v);
-}
-
 void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by)
 {
     compose(by, &motion->collider_placed[collider]);
@@ -827,22 +805,6 @@ static bool is_ride(const drape_motion *motion, const drape_ride *ride)
            (triangles > 0 ? ride->triangle >= 0 && ride->triangle < triangles : ride->triangle == -1);
 }
 
-static void archive_ride(drape_motion *motion, drape_ride *ride, drape_archive *a)
-{
-    drape_archive_int32(a, &ride->collider);
-    drape_archive_int32(a, &ride->triangle);
-    if (ride->collider >= 0) {
-        drape_archive_doubles(a, ride->own, 3);
-        drape_archive_doubles(a, &ride->offset, 1);
-        drape_archive_bool(a, &ride->given);
-        drape_archive_doubles(a, &ride->since, 1);
-    }
-    if (drape_archive_has_read(a) && !is_ride(motion, ride)) {
-        *ride = drape_ride_none();
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid pin on a collider");
-    }
-}
-
 static void archive_placement(drape_placement *placed, drape_archive *a)
 {
     drape_archive_bool(a, &placed->given);
@@ -879,8 +841,21 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         }
         if (drape_archive_good(a))
             archive_path(&motion->pin_path[i], a);
-        if (drape_archive_good(a))
-            archive_ride(motion, &motion->ride[i], a);
+        if (drape_archive_good(a)) {
+            drape_ride *ride = &motion->ride[i];
+            drape_archive_int32(a, &ride->collider);
+            drape_archive_int32(a, &ride->triangle);
+            if (ride->collider >= 0) {
+                drape_archive_doubles(a, ride->own, 3);
+                drape_archive_doubles(a, &ride->offset, 1);
+                drape_archive_bool(a, &ride->given);
+                drape_archive_doubles(a, &ride->since, 1);
+            }
+            if (drape_archive_has_read(a) && !is_ride(motion, ride)) {
+                *ride = drape_ride_none();
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid pin on a collider");
+            }
+        }
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++) {
         archive_path(&motion->collider_path[c], a);
@@ -890,10 +865,9 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
             drape_archive_doubles(a, turn->turn, 3);
             for (int i = 0; i < 2; i++)
                 drape_archive_doubles(a, turn->rate[i], 3);
-            if (drape_archive_has_read(a) && !(drape_all_finite(turn->from, 9) &&
-                                               drape_all_finite(turn->turn, 3) &&
-                                               drape_all_finite(turn->rate[0], 3) &&
-                                               drape_all_finite(turn->rate[1], 3)))
+            if (drape_archive_has_read(a) &&
+                !(drape_all_finite(turn->from, 9) && drape_all_finite(turn->turn, 3) &&
+                  drape_all_finite(turn->rate[0], 3) && drape_all_finite(turn->rate[1], 3)))
                 drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a rotation that is not finite");
         }
         archive_placement(&motion->collider_placed[c], a);

@@ -98,16 +98,28 @@ double drape_motion_collider_power(const drape_motion *motion, const drape_load 
 
 /* Writes the positions of the points of a collider with frames at time t, in its own coordinates, and their
  * velocities there as above. */
-void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x);
-void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t, double within,
-                                   double *v);
+static inline void drape_motion_points(const drape_motion *motion, int32_t collider, double t, double *x)
+{
+    drape_deformation_points(&motion->deformation[collider], t, x);
+}
+static inline void drape_motion_point_velocities(const drape_motion *motion, int32_t collider, double t,
+                                                 double within, double *v)
+{
+    drape_deformation_velocities(&motion->deformation[collider], t, within, v);
+}
 
 /* Sends the points of a collider with frames (drape_deformation_send). */
-void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span, const double *x,
-                         const double *v);
+static inline void drape_motion_deform(drape_motion *motion, int32_t collider, double t, double span,
+                                       const double *x, const double *v)
+{
+    drape_deformation_send(&motion->deformation[collider], t, span, x, v);
+}
 
 /* Whether the points of a collider ever move in its own coordinates. */
-bool drape_motion_deforms(const drape_motion *motion, int32_t collider);
+static inline bool drape_motion_deforms(const drape_motion *motion, int32_t collider)
+{
+    return drape_deformation_moves(&motion->deformation[collider]);
+}
 
 /* Returns the next time after t and before end at which some velocity or the course of a load jumps;
  * otherwise end. drape_motion_at_kink: whether a velocity does, after which a method that follows the

@@ -7,9 +7,7 @@
 #include <sys/stat.h>
 
 #include "base/json_read.h"
-#include "model/scene_cs184.h"
 #include "model/scene_json.h"
-#include "model/scene_print.h"
 #include "model/scene_text.h"
 
 /* jansson counts in int, and its tree takes about ten times the size of the text. */
@@ -59,19 +57,6 @@ void drape_scene_destroy(drape_scene **scene)
 drape_context *drape_scene_context(drape_scene *scene)
 {
     return scene->ctx;
-}
-
-/* "a/b.json" -> "a", "/b.json" -> "/", "b.json" -> NULL. */
-static drape_status keep_folder(drape_scene *scene, const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    if (!slash)
-        return DRAPE_OK;
-    scene->folder = drape_arena_text(&scene->kept, path);
-    if (!scene->folder)
-        return DRAPE_E_MEMORY;
-    scene->folder[slash == path ? 1 : slash - path] = 0;
-    return DRAPE_OK;
 }
 
 static drape_status new_scene(drape_context *ctx, const char *name, drape_scene **out)
@@ -203,24 +188,6 @@ static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
     return parse_fault(scene, drape_text_token(scene->text, consumed, at_end), text);
 }
 
-static drape_status parse_blanked(drape_scene *scene, char *blanked, size_t size)
-{
-    json_error_t error;
-    size_t offset;
-    if (!drape_text_blank_comments(blanked, &offset))
-        return parse_fault(scene, offset, "this comment is not closed");
-    if (blanked[strspn(blanked, " \t\r\n")] == 0)
-        return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is empty", scene->name);
-    scene->root = drape_json_read(blanked, size, LOAD_FLAGS, &error);
-    if (!scene->root)
-        return syntax_fault(scene, &error);
-    if (!json_is_object(scene->root)) {
-        drape_text_find(scene->text, "", &offset);
-        return parse_fault(scene, offset, "a scene is an object, {...}");
-    }
-    return DRAPE_OK;
-}
-
 static drape_status parse_text(drape_scene *scene, size_t size)
 {
     const char *zero = memchr(scene->text, 0, size);
@@ -231,7 +198,19 @@ static drape_status parse_text(drape_scene *scene, size_t size)
     char *blanked = drape_copy_text(scene->ctx, scene->text);
     if (!blanked)
         return DRAPE_E_MEMORY;
-    drape_status status = parse_blanked(scene, blanked, size);
+    json_error_t error;
+    size_t offset = 0;
+    drape_status status = DRAPE_OK;
+    if (!drape_text_blank_comments(blanked, &offset))
+        status = parse_fault(scene, offset, "this comment is not closed");
+    else if (blanked[strspn(blanked, " \t\r\n")] == 0)
+        status = drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is empty", scene->name);
+    else if (!(scene->root = drape_json_read(blanked, size, LOAD_FLAGS, &error)))
+        status = syntax_fault(scene, &error);
+    else if (!json_is_object(scene->root)) {
+        drape_text_find(scene->text, "", &offset);
+        status = parse_fault(scene, offset, "a scene is an object, {...}");
+    }
     drape_free(scene->ctx, blanked);
     return status;
 }
@@ -257,8 +236,13 @@ drape_status drape_scene_load(drape_context *ctx, const char *path, drape_scene 
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_scene_load: path and out are needed");
     locale_t old = drape_locale_enter();
     drape_status status = new_scene(ctx, path, &scene);
-    if (!status)
-        status = keep_folder(scene, path);
+    const char *slash = strrchr(path, '/'); /* "a/b.json" -> "a", "/b.json" -> "/", "b.json" -> NULL */
+    if (!status && slash) {
+        scene->folder = drape_arena_text(&scene->kept, path);
+        if (scene->folder)
+            scene->folder[slash == path ? 1 : slash - path] = 0;
+        status = drape_arena_status(&scene->kept);
+    }
     if (!status)
         status = read_file(scene, path, &size);
     if (!status)

@@ -1,5 +1,5 @@
 /*
- * scene_cs184.c: see scene_cs184.h. Such a scene is an object with at most "cloth", "sphere" and "plane",
+ * scene_cs184.c: see scene_json.h. Such a scene is an object with at most "cloth", "sphere" and "plane",
  * whose members are checked here; like CS184 itself, the reader ignores members that CS184 does not know.
  * Settings that the CS184 program keeps in windows and constants have that program's initial values: gravity
  * -9.8, 90 frames per second with 30 substeps each, bend springs of 0.2 ks, strains limited to 10 % in one
@@ -16,7 +16,7 @@
  * Methods that do not enforce limits by moving nodes use limit.strain and contact, which Verlet omits; for
  * them, friction is Coulomb's mu.
  */
-#include "model/scene_cs184.h"
+#include "model/scene_json.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -24,7 +24,6 @@
 
 #include "base/param.h"
 #include "model/scene.h"
-#include "model/scene_json.h"
 #include "model/scene_text.h"
 
 #define DURATION   3.0 /* [s]; the CS184 program runs until it is closed */

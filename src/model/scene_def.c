@@ -125,32 +125,29 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
 /* ---- Defaults ---- */
 
 /* Arrays without a default stay empty, as in a zeroed def; a list has at most one text as its default. */
-static void set_default(const drape_scene_key *key, void *def)
-{
-    static const double no_rotation[4] = {0};
-    const char *const *text = &key->param.derived;
-    const size_t one = 1;
-    double values[DRAPE_PARAM_WIDEST];
-    const drape_setting setting = {
-        .text = key->literal ? *text : NULL, .vector = no_rotation, .vector_count = 4};
-    if (key->shape == DRAPE_SCENE_OBJECT && key->child->key_count > 0)
-        drape_scene_set_defaults(key->child, (char *)def + key->offset);
-    if (key->shape == DRAPE_SCENE_LIST && key->literal) {
-        memcpy((char *)def + key->offset, &text, sizeof text);
-        memcpy((char *)def + key->count_offset, &one, sizeof one);
-    }
-    if (key->shape != DRAPE_SCENE_VALUE)
-        return;
-    drape_param_default(&key->param, values);
-    drape_scene_store(key, &setting, key->vector ? key->vector : values, def);
-}
-
 void drape_scene_set_defaults(const drape_scene_object *object, void *def)
 {
+    static const double no_rotation[4] = {0};
+    const size_t one = 1;
     if (object->least_size)
         memcpy(def, &object->def_size, sizeof object->def_size);
-    for (size_t i = 0; i < object->key_count; i++)
-        set_default(&object->keys[i], def);
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        const char *const *text = &key->param.derived;
+        double values[DRAPE_PARAM_WIDEST];
+        const drape_setting setting = {
+            .text = key->literal ? *text : NULL, .vector = no_rotation, .vector_count = 4};
+        if (key->shape == DRAPE_SCENE_OBJECT && key->child->key_count > 0)
+            drape_scene_set_defaults(key->child, (char *)def + key->offset);
+        if (key->shape == DRAPE_SCENE_LIST && key->literal) {
+            memcpy((char *)def + key->offset, &text, sizeof text);
+            memcpy((char *)def + key->count_offset, &one, sizeof one);
+        }
+        if (key->shape != DRAPE_SCENE_VALUE)
+            continue;
+        drape_param_default(&key->param, values);
+        drape_scene_store(key, &setting, key->vector ? key->vector : values, def);
+    }
 }
 
 /* Two defaults of hosts differ from the table of keys. A text must give a duration, so its key has no

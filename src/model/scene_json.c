@@ -459,20 +459,6 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- The scene ---- */
 
-/* The version is checked first, because other versions have other keys. */
-static drape_status check_version(reader *r, json_t *root)
-{
-    const drape_scene_key *key = &drape_form_scene.keys[0];
-    json_t *version = json_object_get(root, key->param.name);
-    if (!version)
-        return missing(r, key);
-    drape_pointer_push(&r->at, key->param.name);
-    drape_status status = read_value(r, key, version, NULL);
-    if (!status)
-        drape_pointer_cut(&r->at, 0);
-    return status;
-}
-
 /* Checks that no two cloths have the same name, including the names that the library assigns. */
 static drape_status check_names(reader *r, const drape_scene_def *def)
 {
@@ -503,7 +489,15 @@ drape_status drape_scene_read(drape_context *ctx, drape_arena *arena, json_t *ro
     reader r = {.ctx = ctx, .arena = arena};
     memset(def, 0, sizeof *def);
     drape_scene_set_defaults(&drape_form_scene, def);
-    drape_status status = check_version(&r, root);
+    /* The version is checked first, because other versions have other keys. */
+    const drape_scene_key *key = &drape_form_scene.keys[0];
+    json_t *version = json_object_get(root, key->param.name);
+    if (!version)
+        return missing(&r, key);
+    drape_pointer_push(&r.at, key->param.name);
+    drape_status status = read_value(&r, key, version, NULL);
+    if (!status)
+        drape_pointer_cut(&r.at, 0);
     if (!status)
         status = read_object(&r, &drape_form_scene, root, (char *)def);
     if (!status)

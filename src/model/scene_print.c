@@ -3,7 +3,7 @@
  * numbers have the fewest digits that read back as the same number. jansson's own printers break every vector
  * over four lines and print 0.050000000000000003.
  */
-#include "model/scene_print.h"
+#include "model/scene_json.h"
 
 #include <stdio.h>
 #include <stdlib.h>
