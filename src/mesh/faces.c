@@ -97,24 +97,19 @@ static bool turns_left(const polygon *p, const int *ring, int count, int i, cons
     return vec3_dot(n, normal) > 0;
 }
 
-/* Whether a corner is at a node of the triangle: polygons with holes have a slit along which nodes repeat.
- * */
-static bool is_node_of(const polygon *p, int q, const int side[3][2])
-{
-    const int32_t *node = p->mesh->faces.node + p->corner;
-    return node[q] == node[side[0][0]] || node[q] == node[side[1][0]] || node[q] == node[side[2][0]];
-}
-
 /* Whether corner i can be cut: it turns left, and no corner that does not is in its triangle. */
 static bool is_ear(const polygon *p, const int *ring, int count, int i, const double *normal)
 {
     const int a = ring[(i + count - 1) % count], b = ring[i], c = ring[(i + 1) % count];
     const int side[3][2] = {{a, b}, {b, c}, {c, a}};
+    const int32_t *node = p->mesh->faces.node + p->corner;
     if (!turns_left(p, ring, count, i, normal))
         return false;
     for (int j = 0; j < count; j++) {
         const int q = ring[j];
-        bool within = !is_node_of(p, q, side) && !turns_left(p, ring, count, j, normal);
+        /* polygons with holes have a slit along which nodes repeat */
+        const bool repeats = node[q] == node[a] || node[q] == node[b] || node[q] == node[c];
+        bool within = !repeats && !turns_left(p, ring, count, j, normal);
         for (int k = 0; within && k < 3; k++) {
             double n[3];
             normal_of(p, side[k][0], side[k][1], q, n);

@@ -8,16 +8,6 @@
 const char *const drape_grid_orientations[] = {
     [GRID_HORIZONTAL] = "horizontal", [GRID_VERTICAL] = "vertical", NULL};
 
-drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
-                                 drape_mesh *mesh)
-{
-    const drape_mesh_source source = {.pointer = pointer};
-    mesh->rows = rows;
-    mesh->columns = columns;
-    return drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
-                               2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
-}
-
 drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows)
 {
     if (columns * rows <= DRAPE_MAX_NODES)
@@ -25,6 +15,18 @@ drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int6
     return drape_fail_below(
         ctx, pointer, "columns", "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
         (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
+}
+
+drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
+                                 drape_mesh *mesh)
+{
+    const drape_mesh_source source = {.pointer = pointer};
+    const drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    mesh->rows = rows;
+    mesh->columns = columns;
+    return status ? status
+                  : drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                                        2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
 }
 
 double drape_grid_random(uint64_t *seed)

@@ -29,9 +29,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 {
     const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
     const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
-    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status)
-        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
+    const drape_status status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
     const int32_t last_row = mesh->rows - 1, last_column = mesh->columns - 1;

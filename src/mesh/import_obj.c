@@ -180,12 +180,10 @@ static drape_status read_statements(obj_reader *reader)
         else if (drape_word_is(word, "mtllib")) {
             /* A file may have several of these statements. */
             const drape_word name = rest_of_line(&reader->text);
-            if (name.length != 0) {
-                if (reader->file_size > 0)
-                    reader->file[reader->file_size++] = '\n';
-                for (size_t i = 0; i < name.length; i++)
-                    reader->file[reader->file_size++] = name.start[i] == '\n' ? ' ' : name.start[i];
-            }
+            if (name.length > 0 && reader->file_size > 0)
+                reader->file[reader->file_size++] = '\n';
+            for (size_t i = 0; i < name.length; i++)
+                reader->file[reader->file_size++] = name.start[i] == '\n' ? ' ' : name.start[i];
         } else if (drape_word_is(word, "f"))
             status = read_polygon(reader);
         status = status ? status : drape_check_cancel_after(reader->ctx, 64);

@@ -368,16 +368,6 @@ static int compare_tracks(const void *left, const void *right)
     return a->hash != b->hash ? (a->hash > b->hash ? 1 : -1) : (a->point > b->point) - (a->point < b->point);
 }
 
-static bool are_same(const drape_sequence *frames, const track *a, const track *b)
-{
-    bool same = a->hash == b->hash;
-    for (int32_t f = 0; same && f < frames->frame_count; f++) {
-        const double *x = frames->x + 3 * (size_t)f * (size_t)frames->node_count;
-        same = memcmp(x + 3 * (size_t)a->point, x + 3 * (size_t)b->point, 3 * sizeof *x) == 0;
-    }
-    return same;
-}
-
 /* Sets to[i] to the first point that moves as i does. */
 static drape_status find_same(drape_arena *arena, const drape_sequence *frames, int32_t *to)
 {
@@ -394,7 +384,12 @@ static drape_status find_same(drape_arena *arena, const drape_sequence *frames, 
     if (!status)
         qsort(tracks, points, sizeof *tracks, compare_tracks);
     for (; !status && t < tracks + points; t++) {
-        first = are_same(frames, first, t) ? first : t;
+        bool same = first->hash == t->hash;
+        for (int32_t f = 0; same && f < frames->frame_count; f++) {
+            const double *x = frames->x + 3 * (size_t)f * points;
+            same = memcmp(x + 3 * (size_t)first->point, x + 3 * (size_t)t->point, 3 * sizeof *x) == 0;
+        }
+        first = same ? first : t;
         to[t->point] = first->point;
         status = drape_check_cancel_after(arena->ctx, (size_t)frames->frame_count);
     }

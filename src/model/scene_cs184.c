@@ -81,21 +81,12 @@ bool drape_scene_is_cs184(json_t *root)
 
 /* ---- Checking ---- */
 
-static drape_status refuse(drape_context *ctx, const drape_pointer *at, json_t *value, const char *what,
-                           const char *expected)
-{
-    char given[80];
-    drape_json_describe(value, given, sizeof given);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at->text, "%s is not allowed; %s is %s", given, what,
-                         expected);
-}
-
 static drape_status check_object(drape_context *ctx, const object *o, json_t *value)
 {
     drape_pointer at = {.length = 0};
     drape_pointer_push(&at, o->name);
     if (!json_is_object(value))
-        return refuse(ctx, &at, value, o->name, "an object");
+        return drape_json_refuse(ctx, &at, value, o->name, "an object");
     size_t mark = at.length;
     for (size_t i = 0; i < o->param_count; i++) {
         const drape_param *param = &o->params[i];
@@ -152,12 +143,13 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
     drape_pointer_push(&at, "pinned");
     size_t mark = at.length;
     if (pins && !json_is_array(pins))
-        return refuse(ctx, &at, pins, "pinned", "an array of [x, y], numbers of points of the grid from 0");
+        return drape_json_refuse(ctx, &at, pins, "pinned",
+                                 "an array of [x, y], numbers of points of the grid from 0");
     for (size_t i = 0; i < json_array_size(pins); i++) {
         json_t *pin = json_array_get(pins, i);
         drape_pointer_push_index(&at, i);
         if (json_array_size(pin) != 2)
-            return refuse(ctx, &at, pin, "a pin", "[x, y]");
+            return drape_json_refuse(ctx, &at, pin, "a pin", "[x, y]");
         for (size_t k = 0; k < 2; k++) {
             json_t *value = json_array_get(pin, k);
             const double number = json_number_value(value);
@@ -166,7 +158,7 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
             char expected[60];
             snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[k] - 1);
             drape_pointer_push_index(&at, k);
-            return refuse(ctx, &at, value, k ? "y of a pin" : "x of a pin", expected);
+            return drape_json_refuse(ctx, &at, value, k ? "y of a pin" : "x of a pin", expected);
         }
         drape_pointer_cut(&at, mark);
     }
@@ -271,7 +263,7 @@ drape_status drape_scene_from_cs184(drape_context *ctx, json_t *root, json_t **o
     if (given && !json_is_object(given)) {
         drape_pointer at = {.length = 0};
         drape_pointer_push(&at, "integrator");
-        return refuse(ctx, &at, given, "integrator", "an object");
+        return drape_json_refuse(ctx, &at, given, "integrator", "an object");
     }
     drape_status status = check(ctx, root);
     if (status)

@@ -63,11 +63,12 @@ void drape_json_describe(json_t *value, char *text, size_t size)
 
 /* ---- Faults ---- */
 
-static drape_status refuse_as(reader *r, json_t *value, const char *what, const char *expected)
+drape_status drape_json_refuse(drape_context *ctx, const drape_pointer *at, json_t *value, const char *what,
+                               const char *expected)
 {
     char given[80];
     drape_json_describe(value, given, sizeof given);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "%s is not allowed; %s is %s", given, what,
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at->text, "%s is not allowed; %s is %s", given, what,
                          expected);
 }
 
@@ -75,14 +76,14 @@ static drape_status refuse(reader *r, const drape_scene_key *key, json_t *value)
 {
     char expected[MAX_TAKES];
     drape_scene_takes_text(key, expected, sizeof expected);
-    return refuse_as(r, value, key->param.name, expected);
+    return drape_json_refuse(r->ctx, &r->at, value, key->param.name, expected);
 }
 
 static drape_status refuse_element(reader *r, size_t index, json_t *value, const char *what,
                                    const char *expected)
 {
     drape_pointer_push_index(&r->at, index);
-    return refuse_as(r, value, what, expected);
+    return drape_json_refuse(r->ctx, &r->at, value, what, expected);
 }
 
 static drape_status missing(reader *r, const drape_scene_key *key)
@@ -159,8 +160,9 @@ static drape_status read_numbers(reader *r, json_t *array, double *out)
 /* Reads three numbers inside another array; `what` is their name in messages. */
 static drape_status read_three(reader *r, json_t *value, const char *what, double *out)
 {
-    return json_array_size(value) == 3 ? read_numbers(r, value, out)
-                                       : refuse_as(r, value, what, "three numbers, [x, y, z]");
+    return json_array_size(value) == 3
+               ? read_numbers(r, value, out)
+               : drape_json_refuse(r->ctx, &r->at, value, what, "three numbers, [x, y, z]");
 }
 
 /* Booleans become texts, so that no parameter mistakes them for numbers. */
@@ -189,8 +191,9 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
     for (size_t i = 0; !status && i < json_array_size(value); i++) {
         json_t *one = json_array_get(value, i);
         drape_pointer_push_index(&r->at, i);
-        status = json_array_size(one) == 2 ? read_numbers(r, one, numbers + 2 * i)
-                                           : refuse_as(r, one, "an element", "an array of two numbers");
+        status = json_array_size(one) == 2
+                     ? read_numbers(r, one, numbers + 2 * i)
+                     : drape_json_refuse(r->ctx, &r->at, one, "an element", "an array of two numbers");
         if (!status)
             drape_pointer_cut(&r->at, mark);
     }
@@ -263,7 +266,8 @@ static drape_status read_quaternion(reader *r, const drape_scene_key *key, json_
         return refuse(r, key, value);
     const drape_status status = read_numbers(r, value, q);
     if (!status && q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
-        return refuse_as(r, value, key->param.name, "four numbers, [w, x, y, z], not all of them 0");
+        return drape_json_refuse(r->ctx, &r->at, value, key->param.name,
+                                 "four numbers, [w, x, y, z], not all of them 0");
     memcpy(def + key->offset, q, sizeof q);
     return status;
 }
@@ -311,7 +315,7 @@ static drape_status read_track_key(reader *r, json_t *value, const drape_track_k
                                    drape_track_key *out)
 {
     if (json_array_size(value) != 2)
-        return refuse_as(r, value, "a key of a track", "[time, [x, y, z]]");
+        return drape_json_refuse(r->ctx, &r->at, value, "a key of a track", "[time, [x, y, z]]");
     json_t *time = json_array_get(value, 0);
     if (!json_is_number(time))
         return refuse_element(r, 0, time, "the time of a key", "a number");
@@ -361,8 +365,8 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
             return unknown_key(r, object, name);
         drape_pointer_push(&r->at, name);
         if (json_is_object(member) || json_is_null(member))
-            return refuse_as(r, member, "a setting",
-                             "a number, true, false, a string or an array of numbers or pairs");
+            return drape_json_refuse(r->ctx, &r->at, member, "a setting",
+                                     "a number, true, false, a string or an array of numbers or pairs");
         const drape_status status = read_setting(r, name, member, &settings[count++]);
         if (status)
             return status;
@@ -425,9 +429,9 @@ static drape_status read_element(reader *r, const drape_scene_key *key, json_t *
     if (key->shape == DRAPE_SCENE_ENTRIES && json_string_length(value) > 0)
         return read_value(r, &key->child->keys[0], value, def); /* the key "type" */
     if (!json_is_object(value))
-        return refuse_as(r, value, "an element",
-                         key->shape == DRAPE_SCENE_ENTRIES ? "a name, or an object with a \"type\""
-                                                           : "an object");
+        return drape_json_refuse(r->ctx, &r->at, value, "an element",
+                                 key->shape == DRAPE_SCENE_ENTRIES ? "a name, or an object with a \"type\""
+                                                                   : "an object");
     return read_object(r, key->child, value, def);
 }
 

@@ -18,6 +18,10 @@ drape_status drape_scene_read(drape_context *ctx, drape_arena *arena, json_t *ro
 drape_status drape_json_check(drape_context *ctx, const drape_pointer *at, const drape_param *param,
                               json_t *value);
 
+/* Refuses a value at a pointer: "-1 is not allowed; radius is a number above 0". */
+drape_status drape_json_refuse(drape_context *ctx, const drape_pointer *at, json_t *value, const char *what,
+                               const char *expected);
+
 /* Describes a value briefly, for messages: -1, "be", an array of 2, an object. */
 void drape_json_describe(json_t *value, char *text, size_t size);
 

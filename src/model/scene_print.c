@@ -76,17 +76,14 @@ static void count(void *user, const char *text, size_t size)
     *(size_t *)user += size;
 }
 
-static bool is_scalar(json_t *value)
-{
-    return !json_is_array(value) && !json_is_object(value);
-}
-
 /* Long lists of numbers stay on one line, as one number per line would be no more readable. */
 static bool is_one_line(const printer *p, json_t *value)
 {
     bool scalars = !json_is_object(value);
-    for (size_t i = 0; i < json_array_size(value); i++)
-        scalars = scalars && is_scalar(json_array_get(value, i));
+    for (size_t i = 0; i < json_array_size(value); i++) {
+        const json_t *one = json_array_get(value, i);
+        scalars = scalars && !json_is_array(one) && !json_is_object(one);
+    }
     if (scalars || p->put == count)
         return true;
     size_t size = 0;
@@ -95,7 +92,7 @@ static bool is_one_line(const printer *p, json_t *value)
     return p->column + size <= LINE_WIDTH;
 }
 
-/* ---- Containers ---- */
+/* ---- Values ---- */
 
 /* Writes the separator before an element: nothing before the first one on the same line. */
 static void separate(printer *p, bool first, bool one_line, size_t indent)
@@ -106,44 +103,34 @@ static void separate(printer *p, bool first, bool one_line, size_t indent)
         new_line(p, indent + INDENT);
 }
 
-static void print_array(printer *p, json_t *array, bool one_line, size_t indent)
-{
-    put_text(p, "[");
-    for (size_t i = 0; i < json_array_size(array); i++) {
-        separate(p, i == 0, one_line, indent);
-        print_value(p, json_array_get(array, i), indent + INDENT);
-    }
-    if (!one_line)
-        new_line(p, indent);
-    put_text(p, "]");
-}
-
-static void print_object(printer *p, json_t *object, bool one_line, size_t indent)
-{
-    bool first = true;
-    put_text(p, "{");
-    for (void *it = json_object_iter(object); it; it = json_object_iter_next(object, it)) {
-        const char *key = json_object_iter_key(it);
-        separate(p, first, one_line, indent);
-        print_string(p, key, strlen(key));
-        put_text(p, ": ");
-        print_value(p, json_object_iter_value(it), indent + INDENT);
-        first = false;
-    }
-    if (!one_line)
-        new_line(p, indent);
-    put_text(p, "}");
-}
-
 static void print_value(printer *p, json_t *value, size_t indent)
 {
-    bool one_line = is_one_line(p, value);
+    const bool one_line = is_one_line(p, value);
+    bool first = true;
     switch (json_typeof(value)) {
     case JSON_OBJECT:
-        print_object(p, value, one_line, indent);
+        put_text(p, "{");
+        for (void *it = json_object_iter(value); it; it = json_object_iter_next(value, it)) {
+            const char *key = json_object_iter_key(it);
+            separate(p, first, one_line, indent);
+            print_string(p, key, strlen(key));
+            put_text(p, ": ");
+            print_value(p, json_object_iter_value(it), indent + INDENT);
+            first = false;
+        }
+        if (!one_line)
+            new_line(p, indent);
+        put_text(p, "}");
         break;
     case JSON_ARRAY:
-        print_array(p, value, one_line, indent);
+        put_text(p, "[");
+        for (size_t i = 0; i < json_array_size(value); i++) {
+            separate(p, i == 0, one_line, indent);
+            print_value(p, json_array_get(value, i), indent + INDENT);
+        }
+        if (!one_line)
+            new_line(p, indent);
+        put_text(p, "]");
         break;
     case JSON_STRING:
         print_string(p, json_string_value(value), json_string_length(value));

@@ -127,24 +127,6 @@ void drape_supports_project_matrix(const drape_motion *motion, const drape_patte
     }
 }
 
-/* What the images of a node do not have in common, and what supports of theirs take from that. */
-static void keep_across(const drape_motion *motion, int32_t set, double *g)
-{
-    const drape_model *m = motion->model;
-    const int32_t *node = m->image + m->image_start[set],
-                  count = m->image_start[set + 1] - m->image_start[set];
-    const drape_support *support = drape_support_of(m, node[0]);
-    double n[2][3], mean[3] = {0};
-    if (m->free_of_node[node[0]] < 0)
-        return;
-    for (int32_t i = 0; i < count; i++)
-        vec3_add_scaled(1.0 / count, g + 3 * (size_t)node[i], mean);
-    if (support)
-        project(directions(motion, support, n), n, mean);
-    for (int32_t i = 0; i < count; i++)
-        vec3_add_scaled(-1, mean, g + 3 * (size_t)node[i]);
-}
-
 void drape_supports_keep_reactions(const drape_motion *motion, double *g)
 {
     const drape_model *m = motion->model;
@@ -162,8 +144,20 @@ void drape_supports_keep_reactions(const drape_motion *motion, double *g)
         project(directions(motion, support, n), n, across);
         vec3_add_scaled(-1, across, at);
     }
-    for (int32_t s = 0; s < m->image_set_count; s++)
-        keep_across(motion, s, g);
+    for (int32_t s = 0; s < m->image_set_count; s++) {
+        /* What the images of a node do not have in common, and what supports of theirs take from that. */
+        const int32_t *node = m->image + m->image_start[s], count = m->image_start[s + 1] - m->image_start[s];
+        const drape_support *support = drape_support_of(m, node[0]);
+        double n[2][3], mean[3] = {0};
+        if (m->free_of_node[node[0]] < 0)
+            continue;
+        for (int32_t i = 0; i < count; i++)
+            vec3_add_scaled(1.0 / count, g + 3 * (size_t)node[i], mean);
+        if (support)
+            project(directions(motion, support, n), n, mean);
+        for (int32_t i = 0; i < count; i++)
+            vec3_add_scaled(-1, mean, g + 3 * (size_t)node[i]);
+    }
 }
 
 /* ---- Supports that move ---- */

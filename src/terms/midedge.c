@@ -39,26 +39,6 @@ typedef struct patch {
     double c[3][MIDEDGE_HINGES]; /* phi_i = sum c theta */
 } patch;
 
-/* ---- Neighbours ---- */
-
-static void find_neighbours(patch *p, const double flat[6])
-{
-    drape_midedge *out = p->out;
-    drape_patch_around(p->cloth, p->triangle, flat, &p->around);
-    memcpy(out->node, p->around.node, sizeof out->node);
-    memcpy(out->edge, p->around.edge, sizeof out->edge);
-    memcpy(out->turned, p->around.turned, sizeof out->turned);
-    memcpy(out->shifted, p->around.shifted, sizeof out->shifted);
-    memcpy(out->at_rest, p->around.at_rest, sizeof out->at_rest);
-    memcpy(out->shift, p->around.shift, sizeof out->shift);
-    for (int h = 0; h < MIDEDGE_HINGES; h++)
-        p->open[h] = p->around.beyond[h] >= 0 && !p->cloth->edge_clamped[out->edge[h]];
-    for (int i = 0; i < 3; i++) {
-        out->clamped[i] = p->cloth->edge_clamped[out->edge[i]];
-        out->free[i] = p->around.beyond[i] < 0 && !out->clamped[i];
-    }
-}
-
 /* ---- Quadratic deflections ---- */
 
 /* Outward normal of hinge h (2) and its length, in the plane. */
@@ -82,23 +62,19 @@ static double slope(const patch *p, const int corner[3], const double w[3], cons
     return ((wu * v[1] - wv * u[1]) * nu[0] + (wv * u[0] - wu * v[0]) * nu[1]) / area2;
 }
 
-/* x^2/2, y^2/2 or xy (kind 0, 1, 2) at a node, about a point and in units of a length. */
-static double quadratic(const patch *p, int kind, int node, const double about[2], double unit)
-{
-    const double x = (p->around.flat[2 * node] - about[0]) / unit,
-                 y = (p->around.flat[2 * node + 1] - about[1]) / unit;
-    return kind == 0 ? x * x / 2 : kind == 1 ? y * y / 2 : x * y;
-}
-
-/* Slopes along nu of a quadratic in the two triangles of hinge h. */
+/* Slopes along nu of x^2/2, y^2/2 or xy (kind 0, 1, 2) in the two triangles of hinge h: about a point and in
+ * units of a length. */
 static void slopes(const patch *p, int h, int kind, const double about[2], double unit, const double nu[2],
                    double *inside, double *outside)
 {
     const int *n = drape_patch_hinge[h];
     const int in[3] = {n[0], n[1], n[2]}, out[3] = {n[1], n[0], n[3]};
     double w[4];
-    for (int i = 0; i < 4; i++)
-        w[i] = quadratic(p, kind, n[i], about, unit);
+    for (int i = 0; i < 4; i++) {
+        const double x = (p->around.flat[2 * n[i]] - about[0]) / unit,
+                     y = (p->around.flat[2 * n[i] + 1] - about[1]) / unit;
+        w[i] = kind == 0 ? x * x / 2 : kind == 1 ? y * y / 2 : x * y;
+    }
     *inside = slope(p, in, (const double[]){w[0], w[1], w[2]}, nu);
     *outside = slope(p, out, (const double[]){w[1], w[0], w[3]}, nu);
 }
@@ -184,7 +160,19 @@ bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const dou
         corner[k] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)triangle + (size_t)k];
     if (!drape_orthotropic_frame(values, corner, law, axes, flat))
         return false;
-    find_neighbours(&p, flat);
+    drape_patch_around(cloth, triangle, flat, &p.around);
+    memcpy(out->node, p.around.node, sizeof out->node);
+    memcpy(out->edge, p.around.edge, sizeof out->edge);
+    memcpy(out->turned, p.around.turned, sizeof out->turned);
+    memcpy(out->shifted, p.around.shifted, sizeof out->shifted);
+    memcpy(out->at_rest, p.around.at_rest, sizeof out->at_rest);
+    memcpy(out->shift, p.around.shift, sizeof out->shift);
+    for (int h = 0; h < MIDEDGE_HINGES; h++)
+        p.open[h] = p.around.beyond[h] >= 0 && !cloth->edge_clamped[out->edge[h]];
+    for (int i = 0; i < 3; i++) {
+        out->clamped[i] = cloth->edge_clamped[out->edge[i]];
+        out->free[i] = p.around.beyond[i] < 0 && !out->clamped[i];
+    }
     for (int i = 0; i < 3; i++)
         if (p.open[i])
             find_phi(&p, i);

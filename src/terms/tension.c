@@ -74,34 +74,27 @@ static double tension_along(const wrinkle *w)
     return dot((double[]){n[0] * n[0], n[1] * n[1], 2 * n[0] * n[1]}, w->stress);
 }
 
-/* The one of several directions with the lowest M' T0/sqrt(M' C M): the energy is lower by half the square
- * of its negative part, and the minimum lies between its neighbours. Returns the tangent of the angle to
- * them. */
-static double first_direction(const double c[9], const double t0[3], wrinkle *best)
-{
-    wrinkle w;
-    double m[2] = {1, 0}, lowest = INFINITY, sine, cosine;
-    drape_sin_cos(DRAPE_PI / DIRECTIONS, &sine, &cosine);
-    for (int i = 0; i < DIRECTIONS; i++) {
-        const wrinkle from = {.m = {m[0], m[1]}};
-        wrinkle_at(c, t0, &from, 0, &w);
-        const double value = -w.amount * sqrt(w.stiffness);
-        if (value < lowest) {
-            lowest = value;
-            *best = w;
-        }
-        m[0] = cosine * from.m[0] - sine * from.m[1];
-        m[1] = sine * from.m[0] + cosine * from.m[1];
-    }
-    return sine / cosine;
-}
-
 /* Newton's method for the direction in which the shear vanishes, between the neighbours of the first one;
  * the shear has the sign of the derivative of that quotient. */
 static void find_direction(const double c[9], const double t0[3], wrinkle *w)
 {
+    /* The one of several directions with the lowest M' T0/sqrt(M' C M): the energy is lower by half the
+     * square of its negative part, and the minimum lies between its neighbours. */
     wrinkle first;
-    double high = first_direction(c, t0, &first), low = -high, u = 0;
+    double m[2] = {1, 0}, lowest = INFINITY, sine, cosine;
+    drape_sin_cos(DRAPE_PI / DIRECTIONS, &sine, &cosine);
+    for (int i = 0; i < DIRECTIONS; i++) {
+        const wrinkle from = {.m = {m[0], m[1]}};
+        wrinkle_at(c, t0, &from, 0, w);
+        const double value = -w->amount * sqrt(w->stiffness);
+        if (value < lowest) {
+            lowest = value;
+            first = *w;
+        }
+        m[0] = cosine * from.m[0] - sine * from.m[1];
+        m[1] = sine * from.m[0] + cosine * from.m[1];
+    }
+    double high = sine / cosine, low = -high, u = 0; /* tangents of the angle to the first one */
     *w = first;
     for (bool done = false; !done && w->shear != 0;) {
         double c_turned[3];
