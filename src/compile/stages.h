@@ -6,15 +6,6 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
-/* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "/seams/0" and "name" are "/seams/0/name". */
-/* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "name" of "/seams/0" at "/seams/0/name". */
-/* Fails with DRAPE_E_ARGUMENT at a key of the object at `pointer`: "/seams/0/name" for "name". */
-drape_status drape_compile_refuse(drape_context *ctx, const char *pointer, const char *key,
-                                  const char *format, ...) DRAPE_PRINTF(4, 5);
-/* The largest magnitude [in SI units, or degrees] that lists of a scene may have: keys of tracks and
- * histories, pivots, velocities. Others have ranges of their own. */
-#define DRAPE_MOST 1e9
-
 /* Names number `index` of a list as the scene does or, without a name there, by its kind: "pin3". name: the
  * member of its struct, each of `size` bytes. Refuses the name of one before it; many: what they are. */
 drape_status drape_compile_name(drape_model *model, const char *pointer, const char *kind, const char *many,
