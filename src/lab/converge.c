@@ -8,7 +8,6 @@
  * neighbours agree. Over rtol the slope is that of the error control, 1 where the error is proportional to
  * the tolerance; a method that chooses its order takes another one at another rtol, and no line is fitted.
  */
-#include "base/param.h"
 #include "lab/figure.h"
 #include "lab/run.h"
 #include "lab/series.h"
@@ -32,39 +31,23 @@
 
 /* ---- The cases ---- */
 
-/* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt
- * is, unless the scene fixes the number of substeps. */
-static bool has_own_substeps(const drape_integrator_ops *integrator, const drape_entry_def *given)
-{
-    for (size_t i = 0; i < given->setting_count; i++)
-        if (strcmp(given->settings[i].name, "substeps") == 0 && given->settings[i].number > 0)
-            return false;
-    return integrator->stability &&
-           drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0;
-}
-
-/* The knob of an integrator that controls its error. */
-static const char *tolerance_knob(const drape_integrator_ops *integrator, const drape_entry_def *given)
-{
-    if (!integrator->order_parameter)
-        return "rtol";
-    for (size_t i = 0; i < given->setting_count; i++)
-        if (strcmp(given->settings[i].name, integrator->order_parameter) == 0)
-            return "rtol";
-    return BY_RTOL;
-}
-
 static drape_status add_time(lab *l, const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
     const bool own = integrator->own_steps;
     const double ratio = own ? 0.1 : 0.5;
     lab_level levels[MAX_LEVELS];
     double value = own ? FIRST_RTOL : FIRST_DT;
+    /* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt
+     * is, and one may choose its order by rtol, unless the scene fixes their number or the order. */
+    const char *fixes = own ? integrator->order_parameter : "substeps";
+    bool fixed = own ? !fixes : !integrator->stability || !lab_has_param(&integrator->entry, fixes);
+    for (size_t i = 0; !fixed && i < given->setting_count; i++)
+        fixed = strcmp(given->settings[i].name, fixes) == 0 && (own || given->settings[i].number > 0);
     for (int k = 0; k < l->def->levels; k++, value *= ratio)
         levels[k] = (lab_level){value, -1};
-    const lab_grid grid = {.knob = own                                   ? tolerance_knob(integrator, given)
-                                   : has_own_substeps(integrator, given) ? OWN
-                                                                         : NULL,
+    const lab_grid grid = {.knob = fixed ? NULL
+                                   : own ? BY_RTOL
+                                         : OWN,
                            .rtols = levels,
                            .steps = levels,
                            .rtol_count = (size_t)l->def->levels,
@@ -104,10 +87,13 @@ static drape_status add_level(lab *l, const drape_scene_def *def, int level)
         l, &(lab_point){NULL, SPACE, SPACE_METHOD, NULL, "edge", {ldexp(1, -level), -1}, settings});
 }
 
-static drape_status add_cases(lab *l)
+static drape_status plan(lab *l)
 {
     drape_scene *scene = NULL;
     drape_scene_def def;
+    if (l->def->levels < MIN_LEVELS || l->def->levels > MAX_LEVELS)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; must be %d to %d", l->def->levels,
+                          MIN_LEVELS, MAX_LEVELS);
     drape_status status = lab_load_scene(l->ctx, &(lab_request){.def = l->def}, &scene);
     drape_scene_def_init(&def, sizeof def);
     if (!status)
@@ -120,14 +106,6 @@ static drape_status add_cases(lab *l)
         status = add_level(l, &def, k);
     drape_scene_destroy(&scene);
     return status;
-}
-
-static drape_status plan(lab *l)
-{
-    if (l->def->levels < MIN_LEVELS || l->def->levels > MAX_LEVELS)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; must be %d to %d", l->def->levels,
-                          MIN_LEVELS, MAX_LEVELS);
-    return add_cases(l);
 }
 
 /* All runs are compared at the nodes of the scene's own mesh. */
@@ -196,12 +174,6 @@ static double distance(const json_t *first, const json_t *second)
     return size > 0 && size == json_array_size(y) ? sqrt(sum / ((double)size / 3)) : NAN;
 }
 
-static bool chooses_order(const drape_integrator_ops *integrator)
-{
-    return integrator &&
-           drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") >= 0;
-}
-
 static void read_sequence(const lab_series *series, const lab_series *before_it, sequence *s)
 {
     const json_t *before = NULL;
@@ -222,9 +194,10 @@ static void read_sequence(const lab_series *series, const lab_series *before_it,
         }
         before = good ? r : NULL;
     }
+    const drape_integrator_ops *integrator = lab_find_integrator(s->integrator);
     s->unrefined = strcmp(s->knob, OWN) == 0;
     s->chooses_order = strcmp(s->knob, BY_RTOL) == 0 ||
-                       (is_tolerance(s) && chooses_order(lab_find_integrator(s->integrator)));
+                       (is_tolerance(s) && integrator && lab_has_param(&integrator->entry, "max_order"));
     fit(s);
 }
 
@@ -234,22 +207,14 @@ static double local_order(const sequence *s, size_t i)
     return log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]);
 }
 
-/* The range of the orders between neighbours. */
-static void order_range(const sequence *s, double *low, double *high)
-{
-    *low = INFINITY;
-    *high = -INFINITY;
-    for (size_t i = 1; i < s->count; i++) {
-        *low = fmin(*low, local_order(s, i));
-        *high = fmax(*high, local_order(s, i));
-    }
-}
-
 /* Why there is no line. */
 static void report_no_order(const sequence *s, FILE *out)
 {
-    double low, high;
-    order_range(s, &low, &high);
+    double low = INFINITY, high = -INFINITY; /* of the orders between neighbours */
+    for (size_t i = 1; i < s->count; i++) {
+        low = fmin(low, local_order(s, i));
+        high = fmax(high, local_order(s, i));
+    }
     fprintf(out, "no order, as ");
     if (s->unrefined)
         fprintf(out, "it chooses its own substeps and dt does not refine them; a value of "
@@ -345,14 +310,10 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
 static void write_table(lab *l, const sequence *s)
 {
     const lab_table t = {.l = l};
-    lab_table_begin(&t, s->series, (const char *const[]){s->knob, "moved [m]", "order", NULL});
-    for (size_t i = 0; i < s->count; i++) {
-        lab_table_begin_row(&t);
-        lab_table_put(&t, "%.6g", s->value[i]);
-        lab_table_put(&t, "%.4g", s->moved[i]);
-        lab_table_put(&t, i > 0 && !s->unrefined ? "%.3f" : "", i > 0 ? local_order(s, i) : NAN);
-        lab_table_end_row(&t);
-    }
+    lab_table_begin(&t, s->series, "%s\tmoved [m]\torder", s->knob);
+    for (size_t i = 0; i < s->count; i++)
+        lab_table_row(&t, i > 0 && !s->unrefined ? "%.6g\t%.4g\t%.3f" : "%.6g\t%.4g\t", s->value[i],
+                      s->moved[i], i > 0 ? local_order(s, i) : NAN);
     lab_table_end(&t);
 }
 

@@ -87,11 +87,16 @@ const drape_integrator_ops *lab_find_integrator(const char *name)
     return i < 0 ? NULL : drape_integrators[i];
 }
 
+bool lab_has_param(const drape_entry *entry, const char *name)
+{
+    return drape_param_find(entry->params, entry->param_count, name) >= 0;
+}
+
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer)
 {
     const size_t prefix = strlen("/integrator/");
     return strncmp(pointer, "/integrator/", prefix) == 0 && strcmp(pointer + prefix, "method") != 0 &&
-           drape_param_find(integrator->entry.params, integrator->entry.param_count, pointer + prefix) < 0;
+           !lab_has_param(&integrator->entry, pointer + prefix);
 }
 
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
@@ -245,25 +250,19 @@ static bool writes(const void *user, const char *name)
            ends_in(name, ".pdf") || strcmp(name, "tables.md") == 0 || strcmp(name, "plan.json") == 0;
 }
 
-/* Shards may write into one folder at the same time. */
-static drape_status open_folder(lab *l)
-{
-    drape_status status = drape_folder_open(l->ctx, l->folder, l->def->shards > 1, &l->out);
-    if (!status && l->def->scene)
-        status = drape_folder_protect(l->out, l->def->scene);
-    if (!status)
-        status = drape_folder_check(l->out, writes, writes, l);
-    l->input_is_good = status != DRAPE_E_ARGUMENT;
-    return status;
-}
-
 /* Writes the experiment into the folder, or resumes it if the folder has it. Shards that begin in one folder
  * at the same time write the same content. */
 static drape_status claim_folder(lab *l)
 {
     char path[4200];
     l->input_is_good = true;
-    drape_status status = open_folder(l);
+    /* Shards may write into one folder at the same time. */
+    drape_status status = drape_folder_open(l->ctx, l->folder, l->def->shards > 1, &l->out);
+    if (!status && l->def->scene)
+        status = drape_folder_protect(l->out, l->def->scene);
+    if (!status)
+        status = drape_folder_check(l->out, writes, writes, l);
+    l->input_is_good = status != DRAPE_E_ARGUMENT;
     if (status)
         return status;
     snprintf(path, sizeof path, "%s/" ABOUT, l->folder);

@@ -4,7 +4,6 @@
  * does. Errors are relative to the size of the scene, and taken at times at which steps end.
  */
 #include "lab/ivp.h"
-#include "base/param.h"
 #include "lab/figure.h"
 #include "lab/series.h"
 #include "lab/statistics.h"
@@ -26,12 +25,6 @@ static const lab_level rtols[] = {{1e-2, 2}, {1e-3, 0}, {1e-4, 3}, {1e-5, 1},
                                   {1e-6, 5}, {1e-7, 4}, {1e-8, 6}, {1e-9, 7}};
 static const lab_level controlled[] = {{1e-3, 8}, {1e-4, 9}, {1e-5, 8}, {1e-6, 9}};
 
-/* The scenes while the program runs; a merge has none. */
-typedef struct set {
-    lab_ivp *scenes;
-    size_t count;
-} set;
-
 /* ---- The cases ---- */
 
 /* The tolerance of Newton's method. Under a controller, whose steps have errors of order p + 1, for the step
@@ -41,7 +34,7 @@ static void add_tolerance(const void *user, const drape_integrator_ops *integrat
 {
     const lab_ivp *s = user;
     const double h = isnan(dt) ? fmin(pow(rtol, 1.0 / (integrator->order + 1)), 1) * s->interval : dt;
-    if (drape_param_find(integrator->entry.params, integrator->entry.param_count, "tolerance") >= 0)
+    if (lab_has_param(&integrator->entry, "tolerance"))
         json_object_set_new(settings, "/integrator/tolerance",
                             json_real(lab_ivp_tolerance(s, integrator->order, h)));
 }
@@ -70,53 +63,40 @@ static drape_status add_scene(lab *l, const lab_ivp *s)
     return status;
 }
 
-/* What the report says of a scene besides its cases, and what makes results comparable. */
-static json_t *describe_scene(const lab_ivp *s)
-{
-    json_t *about =
-        json_pack("{s:s, s:s, s:f, s:f, s:f}", "name", s->name, "hash", s->hash, "size_m", s->size,
-                  "duration_s", s->times[s->time_count - 1], "reference_error", s->error);
-    json_t *horizon = lab_ivp_read_horizon(s);
-    static const char *const keys[] = {"horizon_s", "t_s", "growth"};
-    for (size_t i = 0; horizon && i < sizeof keys / sizeof *keys; i++)
-        json_object_set(about, keys[i], json_object_get(horizon, keys[i]));
-    json_decref(horizon);
-    return about;
-}
-
-static drape_status open_scene(lab *l, const char *path, lab_ivp *s)
-{
-    drape_status status = lab_ivp_open(&l->arena, path, s);
-    if (!status)
-        status = lab_ivp_read_reference(s);
-    lab_ivp_close(s); /* cases compile their own */
-    return status;
-}
-
+/* l->own: the scenes, while the program runs; a merge has none. */
 static drape_status plan(lab *l)
 {
+    static const char *const keys[] = {"horizon_s", "t_s", "growth"};
     const size_t count = l->def->scene_count ? l->def->scene_count : 1;
-    set *own = l->own = drape_arena_take(&l->arena, 1, sizeof *own);
-    drape_status status = DRAPE_OK;
-    if (own)
-        own->scenes = drape_arena_take(&l->arena, count, sizeof *own->scenes);
-    if (!own || !own->scenes)
+    lab_ivp *own = l->own = drape_arena_take(&l->arena, count, sizeof *own);
+    if (!own)
         return DRAPE_E_MEMORY;
-    own->count = count;
+    drape_status status = DRAPE_OK;
     if (l->def->setting_count)
         status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                             "ivp takes no settings: the references are of the scenes as they are");
     json_t *scenes = json_array();
     for (size_t i = 0; !status && i < count; i++) {
-        status = open_scene(l, l->def->scene_count ? l->def->scenes[i] : l->def->scene, &own->scenes[i]);
+        lab_ivp *s = &own[i];
+        status = lab_ivp_open(&l->arena, l->def->scene_count ? l->def->scenes[i] : l->def->scene, s);
+        if (!status)
+            status = lab_ivp_read_reference(s);
+        lab_ivp_close(s); /* cases compile their own */
         for (size_t k = 0; !status && k < i; k++)
-            if (strcmp(own->scenes[i].name, own->scenes[k].name) == 0)
-                status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "two scenes have the name \"%.100s\"",
-                                    own->scenes[i].name);
-        if (!status) {
-            scenes = drape_json_append(scenes, describe_scene(&own->scenes[i]));
-            status = add_scene(l, &own->scenes[i]);
-        }
+            if (strcmp(s->name, own[k].name) == 0)
+                status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "two scenes have the name \"%.100s\"", s->name);
+        if (status)
+            break;
+        /* What the report says of a scene besides its cases, and what makes results comparable. */
+        json_t *about =
+            json_pack("{s:s, s:s, s:f, s:f, s:f}", "name", s->name, "hash", s->hash, "size_m", s->size,
+                      "duration_s", s->times[s->time_count - 1], "reference_error", s->error);
+        json_t *horizon = lab_ivp_read_horizon(s);
+        for (size_t k = 0; horizon && k < sizeof keys / sizeof *keys; k++)
+            json_object_set(about, keys[k], json_object_get(horizon, keys[k]));
+        json_decref(horizon);
+        scenes = drape_json_append(scenes, about);
+        status = add_scene(l, s);
     }
     json_object_set_new(l->arguments, "scenes", scenes);
     if (!status && json_array_size(l->cases) == 0)
@@ -127,9 +107,8 @@ static drape_status plan(lab *l)
 
 static void complete_request(const lab *l, size_t index, lab_request *request)
 {
-    const set *own = l->own;
     const char *scene = lab_tag_text(json_array_get(l->cases, index), "scene");
-    const lab_ivp *s = own->scenes;
+    const lab_ivp *s = l->own;
     while (strcmp(s->name, scene) != 0)
         s++;
     request->scene = s->path;
@@ -196,257 +175,198 @@ static double cost_at(const lab_series *s, double error, const json_t **at)
 
 /* ---- Tables ---- */
 
-/* "ida, order 5; rtol 1e-05; 0.021 s; 1.7 (trbdf2); 12" */
-static void put_cheapest(const lab_table *t, const lab_series *list, size_t count, double error)
+/* The row of a scene: "ball; ida, order 5, rtol 1e-05 (0.021 s); 1.7 (trbdf2); 12". */
+static void put_cheapest(const lab_table *t, const scene *s, double error)
 {
     const json_t *best_at = NULL, *other_at = NULL;
-    const lab_series *best = NULL, *next = NULL, *base = lab_find_series(list, count, BASE_METHOD);
+    const lab_series *best = NULL, *next = NULL, *base = lab_find_series(s->series, s->count, BASE_METHOD);
     double least = NAN, second = NAN;
-    char knob[64];
-    for (size_t i = 0; i < count; i++) {
+    char knob[64], other[1200] = "", usual[64];
+    for (size_t i = 0; i < s->count; i++) {
         const json_t *at = NULL;
-        const double cost = cost_at(&list[i], error, &at);
+        const double cost = cost_at(&s->series[i], error, &at);
         if (isnan(cost) || cost >= least)
             continue;
         least = cost;
-        best = &list[i];
+        best = &s->series[i];
         best_at = at;
     }
-    for (size_t i = 0; best && i < count; i++) {
-        const double cost = cost_at(&list[i], error, &other_at);
-        if (strcmp(list[i].integrator, best->integrator) != 0 && !isnan(cost) && !(cost >= second)) {
-            second = cost;
-            next = &list[i];
-        }
-    }
     if (!best) {
-        lab_table_put(t, "none");
-        lab_table_put(t, "%s", "");
-        lab_table_put(t, "%s", "");
+        lab_table_row(t, "%s\tnone\t\t", s->name);
         return;
     }
-    lab_knob_text(best_at, knob);
-    lab_table_put(t, "%s, %s (%.2g s)", best->name, knob, least);
-    lab_table_put(t, next ? "%.2g (%s)" : "", second / least, next ? next->name : "");
+    for (size_t i = 0; i < s->count; i++) {
+        const double cost = cost_at(&s->series[i], error, &other_at);
+        if (strcmp(s->series[i].integrator, best->integrator) != 0 && !isnan(cost) && !(cost >= second)) {
+            second = cost;
+            next = &s->series[i];
+        }
+    }
     const double cost = base ? cost_at(base, error, &other_at) : NAN;
-    lab_table_put(t, !base ? "was not run" : isnan(cost) ? "does not reach it" : "%.2g", cost / least);
+    lab_knob_text(best_at, knob);
+    if (next)
+        snprintf(other, sizeof other, "%.2g (%s)", second / least, next->name);
+    snprintf(usual, sizeof usual,
+             !base         ? "was not run"
+             : isnan(cost) ? "does not reach it"
+                           : "%.2g",
+             cost / least);
+    lab_table_row(t, "%s\t%s, %s (%.2g s)\t%s\t%s", s->name, best->name, knob, least, other, usual);
 }
 
 static void tabulate_cheapest(const tables *all)
 {
-    static const char *const heads[] = {"scene", "cheapest method", "the next other method costs, times",
-                                        BASE_METHOD " costs, times", NULL};
     const lab_table *t = &all->table;
     for (int decade = -2; decade >= -4; decade--) {
         char title[96];
         snprintf(title, sizeof title, "At an error of 1e%d of the size", decade);
-        lab_table_begin(t, title, heads);
-        for (const scene *s = all->scenes; s < all->scenes + all->count; s++) {
-            lab_table_begin_row(t);
-            lab_table_put(t, "%s", s->name);
-            put_cheapest(t, s->series, s->count, pow(10, decade));
-            lab_table_end_row(t);
-        }
+        lab_table_begin(t, title,
+                        "scene\tcheapest method\tthe next other method costs, times\t" BASE_METHOD
+                        " costs, times");
+        for (const scene *s = all->scenes; s < all->scenes + all->count; s++)
+            put_cheapest(t, s, pow(10, decade));
         lab_table_end(t);
     }
 }
 
-/* Whether a case has the fixed steps of its dt, so that it may show an order. */
-static bool has_its_steps(const json_t *r)
-{
-    const double limit = lab_number(r, "explicit_limit_s");
-    return lab_number(r, "rejected") == 0 && !(lab_tag_number(r, "value") > 0.5 * limit);
-}
-
 /* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
- * the finest. Points within the reference's error, and cases whose steps were cut, are none. */
+ * the finest. Points within the reference's error, and cases whose steps were not all of dt, are none. */
 static size_t asymptotic_range(const lab_series *s, double dt[MAX_POINTS], double error[MAX_POINTS])
 {
     size_t count = 0;
     for (size_t i = s->count; i-- > 0 && count < MAX_POINTS;) {
         const json_t *r = s->results[i];
-        const double e = resolved_error(r);
+        const double e = resolved_error(r), limit = lab_number(r, "explicit_limit_s");
         if (isnan(e) && count == 0)
             continue;
-        if (!(e < LARGEST) || !has_its_steps(r))
-            break;
         dt[count] = lab_tag_number(r, "value");
+        if (!(e < LARGEST) || lab_number(r, "rejected") != 0 || dt[count] > 0.5 * limit)
+            break;
         error[count++] = e;
     }
     return lab_same_order(dt, error, count);
 }
 
-static void put_order(const lab_table *t, const lab_series *s)
-{
-    double dt[MAX_POINTS], error[MAX_POINTS];
-    const size_t points = strcmp(s->knob, "dt") == 0 ? asymptotic_range(s, dt, error) : 0;
-    if (points < 3)
-        return;
-    const lab_line line = lab_fit_power(dt, error, points);
-    lab_table_begin_row(t);
-    lab_table_put(t, "%s", s->scene);
-    lab_table_put(t, "%s", s->name);
-    lab_table_put(t, "%.2f", line.slope);
-    lab_table_put(t, "%.2f to %.2f", line.low, line.high);
-    lab_table_put(t, "1/%.4g to 1/%.4g", 1 / dt[points - 1], 1 / dt[0]);
-    lab_table_put(t, "%.1e to %.1e", error[points - 1], error[0]);
-    lab_table_end_row(t);
-}
-
 static void tabulate_orders(const tables *all)
 {
-    static const char *const heads[] = {"scene",  "method", "order", "95 % confidence",
-                                        "dt [s]", "errors", NULL};
-    lab_table_begin(&all->table, "Observed orders", heads);
+    double dt[MAX_POINTS], error[MAX_POINTS];
+    const lab_table *t = &all->table;
+    lab_table_begin(t, "Observed orders", "scene\tmethod\torder\t95 %% confidence\tdt [s]\terrors");
     for (const scene *s = all->scenes; s < all->scenes + all->count; s++)
-        for (size_t k = 0; k < s->count; k++)
-            put_order(&all->table, &s->series[k]);
-    lab_table_end(&all->table);
-}
-
-/* The reason that was counted most often. */
-static const char *main_reason(const json_t *result)
-{
-    const char *most = "", *reason;
-    json_int_t largest = 0;
-    json_t *count;
-    json_object_foreach(json_object_get(result, "reasons"), reason, count)
-    {
-        if (strcmp(reason, "converged") != 0 && json_integer_value(count) > largest) {
-            largest = json_integer_value(count);
-            most = reason;
+        for (size_t k = 0; k < s->count; k++) {
+            const lab_series *one = &s->series[k];
+            const size_t points = strcmp(one->knob, "dt") == 0 ? asymptotic_range(one, dt, error) : 0;
+            if (points < 3)
+                continue;
+            const lab_line line = lab_fit_power(dt, error, points);
+            lab_table_row(t, "%s\t%s\t%.2f\t%.2f to %.2f\t1/%.4g to 1/%.4g\t%.1e to %.1e", one->scene,
+                          one->name, line.slope, line.low, line.high, 1 / dt[points - 1], 1 / dt[0],
+                          error[points - 1], error[0]);
         }
-    }
-    return most;
+    lab_table_end(t);
 }
 
 static void tabulate_failures(const tables *all)
 {
-    static const char *const heads[] = {
-        "scene", "method", "setting", "status", "at [s]", "most frequent reason", NULL};
     const lab_table *t = &all->table;
-    lab_table_begin(t, "Runs that did not complete", heads);
+    lab_table_begin(t, "Runs that did not complete",
+                    "scene\tmethod\tsetting\tstatus\tat [s]\tmost frequent reason");
     for (size_t i = 0; i < t->l->count; i++) {
         const json_t *r = t->l->results[i];
-        char knob[64];
+        char knob[64], most[128] = "";
+        const char *reason;
+        json_int_t largest = 0;
+        json_t *count;
         if (!r || lab_is_good(r))
             continue;
+        json_object_foreach(json_object_get(r, "reasons"), reason, count)
+        {
+            if (strcmp(reason, "converged") != 0 && json_integer_value(count) > largest) {
+                largest = json_integer_value(count);
+                snprintf(most, sizeof most, "%s", reason);
+            }
+        }
         lab_knob_text(r, knob);
-        lab_table_begin_row(t);
-        lab_table_put(t, "%s", lab_tag_text(r, "scene"));
-        lab_table_put(t, "%s", lab_tag_text(r, "series"));
-        lab_table_put(t, "%s", knob);
-        lab_table_put(t, "%s", lab_text(r, "status"));
-        lab_table_put(t, "%.3g", lab_number(r, "time_s"));
-        lab_table_put(t, "%s", main_reason(r));
-        lab_table_end_row(t);
+        drape_make_printable(most); /* a file of a stranger has any text there */
+        lab_table_row(t, "%s\t%s\t%s\t%s\t%.3g\t%s", lab_tag_text(r, "scene"), lab_tag_text(r, "series"),
+                      knob, lab_text(r, "status"), lab_number(r, "time_s"), most);
     }
     lab_table_end(t);
 }
 
-static void horizon_text(const json_t *about, char *text, size_t size)
+static void horizon_text(const json_t *about, char text[64])
 {
     const json_t *t_s = json_object_get(about, "t_s");
     const double last = json_number_value(json_array_get(t_s, json_array_size(t_s) - 1));
     if (!t_s)
-        snprintf(text, size, "not measured");
+        snprintf(text, 64, "not measured");
     else if (isnan(lab_number(about, "horizon_s")))
-        snprintf(text, size, "beyond %.3g", last);
+        snprintf(text, 64, "beyond %.3g", last);
     else
-        snprintf(text, size, "%.3g", lab_number(about, "horizon_s"));
+        snprintf(text, 64, "%.3g", lab_number(about, "horizon_s"));
 }
 
 static void tabulate_scenes(const tables *all)
 {
-    static const char *const heads[] = {
-        "scene", "nodes", "duration [s]", "horizon [s]", "error of the reference", NULL};
     const lab_table *t = &all->table;
-    lab_table_begin(t, "Scenes", heads);
+    lab_table_begin(t, "Scenes", "scene\tnodes\tduration [s]\thorizon [s]\terror of the reference");
     for (const scene *s = all->scenes; s < all->scenes + all->count; s++) {
         char horizon[64];
         double nodes = NAN;
         for (size_t k = 0; k < s->count && isnan(nodes); k++)
             nodes = s->series[k].count ? lab_number(s->series[k].results[0], "nodes") : NAN;
-        horizon_text(s->about, horizon, sizeof horizon);
-        lab_table_begin_row(t);
-        lab_table_put(t, "%s", s->name);
-        lab_table_put(t, "%.0f", nodes);
-        lab_table_put(t, "%.3g", lab_number(s->about, "duration_s"));
-        lab_table_put(t, "%s", horizon);
-        lab_table_put(t, "%.1e", lab_number(s->about, "reference_error"));
-        lab_table_end_row(t);
+        horizon_text(s->about, horizon);
+        lab_table_row(t, "%s\t%.0f\t%.3g\t%s\t%.1e", s->name, nodes, lab_number(s->about, "duration_s"),
+                      horizon, lab_number(s->about, "reference_error"));
     }
     lab_table_end(t);
 }
 
 /* ---- Figures ---- */
 
-typedef struct chart {
-    const char *suffix, *label, *key, *knob; /* knob: only series over this one; NULL: all */
-    bool energy;                             /* over it, not the error */
-} chart;
-
-static const chart charts[] = {
-    {"cpu", "CPU [s]", "cpu_s", NULL, false},   {"residuals", "residuals", "residuals", NULL, false},
-    {"dt", "dt [s]", "value", "dt", false},     {"rtol", "rtol", "value", "rtol", false},
-    {"energy", "CPU [s]", "cpu_s", NULL, true},
-};
-
-/* A block of the points of a series on a chart. gained: those where the method gained energy instead of
- * losing it. */
-static void put_points(lab_figure *f, const chart *c, const lab_series *s, bool gained)
+static bool is_resolved(const json_t *result)
 {
-    lab_figure_data(f);
-    for (size_t k = 0; k < s->count; k++) {
-        const json_t *r = s->results[k];
-        const double drift = lab_is_good(r) ? lab_number(r, "energy_drift") : NAN;
-        const double x = c->knob ? lab_tag_number(r, "value") : lab_number(r, c->key),
-                     y = c->energy ? (gained ? -drift : drift)
-                         : gained  ? NAN
-                                   : resolved_error(r);
-        if (x > 0 && y > 0)
-            lab_figure_point(f, x, y);
-    }
+    return !isnan(resolved_error(result));
 }
 
-static void describe_chart(const json_t *about, const chart *c, char *text, size_t size)
+static drape_status draw(lab *l, const scene *of)
 {
-    char horizon[64];
-    horizon_text(about, horizon, sizeof horizon);
-    snprintf(text, size,
-             "%.60s: %s, over %s. The error of the reference is %.1e, the horizon %s s, the duration %.3g s.",
-             lab_text(about, "name"),
-             c->energy
-                 ? "energy that the method lost, or, at open markers, gained, over the largest kinetic energy"
-                 : "error, the largest of the times, of the RMS over the nodes",
-             c->label, lab_number(about, "reference_error"), horizon, lab_number(about, "duration_s"));
-}
-
-static drape_status draw(lab *l, const scene *of, const chart *c)
-{
-    lab_figure f;
-    bool any_gained = false;
-    char name[300], caption[400];
-    snprintf(name, sizeof name, "%.255s_%s", of->name, c->suffix);
-    lab_figure_begin(l, &f, name);
-    for (const lab_series *s = of->series; s < of->series + of->count; s++) {
-        if (c->knob && strcmp(s->knob, c->knob) != 0)
-            continue;
-        const lab_style open = lab_style_of(s->integrator, 1);
-        put_points(&f, c, s, false);
-        const bool lost = lab_figure_series(&f, s->integrator, s->variant, s->name);
-        put_points(&f, c, s, true);
-        any_gained |= lab_figure_curve(&f, (lab_style){open.colour, 0, open.point},
-                                       lost || s->variant > 0 ? NULL : s->name);
+#define ERROR .y = "error_max", .y_label = "error / size", .shows = is_resolved
+    static const lab_chart charts[] = {
+        {.name = "cpu", .x = "cpu_s", .x_label = "CPU [s]", ERROR},
+        {.name = "residuals", .x = "residuals", .x_label = "residuals", ERROR},
+        {.name = "dt", .knob = "dt", .x_label = "dt [s]", .orders = 2, ERROR},
+        {.name = "rtol", .knob = "rtol", .x_label = "rtol", .orders = 1, ERROR},
+        {.name = "energy",
+         .x = "cpu_s",
+         .x_label = "CPU [s]",
+         .y = "energy_drift",
+         .y_label = "|energy_drift|",
+         .negative = "gained",
+         .shows = lab_is_good},
+    };
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < sizeof charts / sizeof *charts; i++) {
+        lab_chart c = charts[i];
+        char name[300], title[160], caption[400], horizon[64];
+        horizon_text(of->about, horizon);
+        snprintf(name, sizeof name, "%.255s_%s", of->name, c.name);
+        snprintf(title, sizeof title, "%.150s", of->name);
+        snprintf(
+            caption, sizeof caption,
+            "%.60s: %s, over %s. The error of the reference is %.1e, the horizon %s s, the duration %.3g s.",
+            lab_text(of->about, "name"),
+            c.negative
+                ? "energy that the method lost, or, at open markers, gained, over the largest kinetic energy"
+                : "error, the largest of the times, of the RMS over the nodes",
+            c.x_label, lab_number(of->about, "reference_error"), horizon,
+            lab_number(of->about, "duration_s"));
+        c.name = name;
+        c.title = title;
+        c.caption = caption;
+        status = lab_draw_series(l, &c, of->series, of->count);
     }
-    snprintf(f.title, sizeof f.title, "%.150s", of->name);
-    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->label);
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, c->energy ? "|energy_drift|" : "error / size");
-    if (any_gained)
-        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "gained");
-    lab_figure_fit(&f, !c->knob ? 0 : strcmp(c->knob, "dt") == 0 ? 2 : 1);
-    describe_chart(of->about, c, caption, sizeof caption);
-    return lab_figure_end(l, &f, caption);
+    return status;
 }
 
 /* The growth of the perturbation of each scene, over time in units of the duration. */
@@ -516,8 +436,7 @@ static drape_status report(lab *l)
     if (!status)
         status = draw_horizons(&all);
     for (size_t i = 0; !status && i < count; i++)
-        for (size_t k = 0; !status && k < sizeof charts / sizeof *charts; k++)
-            status = draw(l, &scenes[i], &charts[k]);
+        status = draw(l, &scenes[i]);
     return status ? status : tabulate(&all);
 }
 

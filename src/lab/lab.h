@@ -104,6 +104,8 @@ const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: ther
 /* Whether the integrators that the def names include this one; fallback if it names none. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 
+bool lab_has_param(const drape_entry *entry, const char *name);
+
 /* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its
  * parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);

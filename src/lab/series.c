@@ -1,7 +1,6 @@
 /* series.c: see series.h. */
 #include "lab/series.h"
 
-#include "base/param.h"
 #include "control/control.h"
 
 #include <math.h>
@@ -30,28 +29,20 @@ drape_status lab_add_point(lab *l, const lab_point *p)
     return status;
 }
 
-/* The limits of its order that an integrator is run with: 2 and 5 if it has the parameter max_order and the
- * def does not set it; otherwise 0, for none, alone. Returns their number. */
-static size_t order_limits(const lab *l, const drape_integrator_ops *integrator, int limits[2])
-{
-    bool chosen = drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") < 0;
-    for (size_t i = 0; i < l->def->setting_count; i++)
-        chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
-    limits[0] = chosen ? 0 : 2;
-    limits[1] = 5;
-    return chosen ? 1 : 2;
-}
-
 /* Each series has one limit of the order: a line through points of different limits has no meaning. */
 static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
 {
     const bool own = integrator->own_steps;
     const lab_level *levels = own ? g->rtols : g->steps;
     const size_t count = own ? g->rtol_count : g->step_count;
-    int limits[2];
     drape_status status = DRAPE_OK;
-    const size_t limit_count = order_limits(l, integrator, limits);
-    for (size_t k = 0; k < limit_count; k++) {
+    /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it; otherwise 0,
+     * for none, alone. */
+    bool chosen = !lab_has_param(&integrator->entry, "max_order");
+    for (size_t i = 0; i < l->def->setting_count; i++)
+        chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
+    const int limits[2] = {chosen ? 0 : 2, 5};
+    for (size_t k = 0; k < (chosen ? 1 : 2); k++) {
         char series[96];
         snprintf(series, sizeof series, limits[k] ? "%s, order %d" : "%s", integrator->entry.name, limits[k]);
         for (size_t i = 0; !status && i < count; i++) {
@@ -74,7 +65,7 @@ static drape_status add_controlled(lab *l, const lab_grid *g, const drape_integr
     for (int c = 0; drape_controllers[c]; c++) {
         const drape_entry *controller = &drape_controllers[c]->entry;
         char series[96];
-        if (drape_param_find(controller->params, controller->param_count, "rtol") < 0)
+        if (!lab_has_param(controller, "rtol"))
             continue;
         snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
         for (size_t i = 0; !status && i < g->controlled_count; i++) {
@@ -136,6 +127,40 @@ const lab_series *lab_find_series(const lab_series *list, size_t count, const ch
         if (strcmp(list[i].name, name) == 0)
             return &list[i];
     return NULL;
+}
+
+drape_status lab_draw_series(lab *l, const lab_chart *c, const lab_series *list, size_t count)
+{
+    lab_figure f;
+    bool any_negative = false;
+    lab_figure_begin(l, &f, c->name);
+    snprintf(f.title, sizeof f.title, "%s", c->title ? c->title : "");
+    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
+    snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
+    for (const lab_series *s = list; s < list + count; s++) {
+        const lab_style open = lab_style_of(s->integrator, 1);
+        bool positive = false;
+        for (int sign = 1; sign >= (c->negative ? -1 : 1) && (!c->knob || strcmp(s->knob, c->knob) == 0);
+             sign -= 2) {
+            lab_figure_data(&f);
+            for (size_t i = 0; i < s->count; i++) {
+                const json_t *r = s->results[i];
+                const double x = c->knob ? lab_tag_number(r, "value") : lab_number(r, c->x);
+                const double y = c->shows(r) ? sign * lab_number(r, c->y) : NAN;
+                if (x > 0 && y > 0)
+                    lab_figure_point(&f, x, y);
+            }
+            if (sign > 0)
+                positive = lab_figure_series(&f, s->integrator, s->variant, s->name);
+            else
+                any_negative |= lab_figure_curve(&f, (lab_style){open.colour, 0, open.point},
+                                                 positive || s->variant > 0 ? NULL : s->name);
+        }
+    }
+    if (any_negative)
+        lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, c->negative);
+    lab_figure_fit(&f, c->orders);
+    return lab_figure_end(l, &f, c->caption ? c->caption : c->y_label);
 }
 
 void lab_knob_text(const json_t *result, char text[64])

@@ -6,7 +6,7 @@
 #ifndef DRAPE_LAB_SERIES_H
 #define DRAPE_LAB_SERIES_H
 
-#include "lab/lab.h"
+#include "lab/figure.h"
 
 /* ---- Plans ---- */
 
@@ -60,6 +60,19 @@ lab_series *lab_list_series(lab *l, const char *scene, size_t *count);
 
 /* The series of that name; NULL: there is none. */
 const lab_series *lab_find_series(const lab_series *list, size_t count, const char *name);
+
+/* A figure of series, a curve each, over logarithmic axes. */
+typedef struct lab_chart {
+    const char *name, *title, *caption; /* NULL: no title; the caption is y_label */
+    const char *x, *y;                  /* the results that are shown */
+    const char *knob; /* only series over this one, over its values instead of x; NULL: all */
+    const char *x_label, *y_label;
+    const char *negative; /* what y < 0 means: open markers at its magnitude; NULL: these are left out */
+    int orders;           /* as of lab_figure_fit */
+    bool (*shows)(const json_t *result);
+} lab_chart;
+
+drape_status lab_draw_series(lab *l, const lab_chart *chart, const lab_series *list, size_t count);
 
 /* "dt 1/60 s", "rtol 0.001" */
 void lab_knob_text(const json_t *result, char text[64]);

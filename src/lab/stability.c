@@ -5,7 +5,6 @@
  * axis is the step of an explicit integrator, its stability limit, as estimated at the start of each run, is
  * drawn over the map.
  */
-#include "base/param.h"
 #include "base/retired.h"
 #include "lab/figure.h"
 #include "lab/quantity.h"
@@ -185,7 +184,7 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
      * retries steps that fail. A map is to show the limit: one substep a step and no retries, unless they
      * are asked for. */
     if (integrator->stability && !is_set(l, s, "/integrator/substeps") &&
-        drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0)
+        lab_has_param(&integrator->entry, "substeps"))
         json_object_set_new(settings, "/integrator/substeps", json_integer(1));
     if (integrator->stability && !is_set(l, s, "/controller/type"))
         json_object_set_new(settings, "/controller/type", json_string("fixed"));

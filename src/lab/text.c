@@ -144,87 +144,79 @@ void lab_page_heading(lab *l, const char *text)
     fputs("</h2>\n", l->page);
 }
 
-void lab_page_text(lab *l, const char *text)
-{
-    put_escaped(l->page, text);
-}
-
-static void put_base64(FILE *out, const unsigned char *data, size_t size)
+void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption)
 {
     static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const unsigned char *data = (const unsigned char *)svg;
+    fputs("<figure><img alt=\"", l->page);
+    put_escaped(l->page, caption);
+    fputs("\" src=\"data:image/svg+xml;base64,", l->page);
     for (size_t i = 0; i < size; i += 3) {
         unsigned long bits = (unsigned long)data[i] << 16;
         bits |= i + 1 < size ? (unsigned long)data[i + 1] << 8 : 0;
         bits |= i + 2 < size ? data[i + 2] : 0;
-        fputc(letters[bits >> 18 & 63], out);
-        fputc(letters[bits >> 12 & 63], out);
-        fputc(i + 1 < size ? letters[bits >> 6 & 63] : '=', out);
-        fputc(i + 2 < size ? letters[bits & 63] : '=', out);
+        fputc(letters[bits >> 18 & 63], l->page);
+        fputc(letters[bits >> 12 & 63], l->page);
+        fputc(i + 1 < size ? letters[bits >> 6 & 63] : '=', l->page);
+        fputc(i + 2 < size ? letters[bits & 63] : '=', l->page);
     }
-}
-
-void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption)
-{
-    fputs("<figure><img alt=\"", l->page);
-    put_escaped(l->page, caption);
-    fputs("\" src=\"data:image/svg+xml;base64,", l->page);
-    put_base64(l->page, (const unsigned char *)svg, size);
     fputs("\"><figcaption>", l->page);
     put_escaped(l->page, caption);
     fputs("</figcaption></figure>\n", l->page);
 }
 
-static void put_cell(const lab_table *t, const char *kind, const char *text)
+/* A row of cells that tabs separate, whose number it returns; kind: the element of HTML that a cell is. */
+static int put_row(const lab_table *t, const char *kind, char *cells)
 {
-    fprintf(t->l->page, "<%s>", kind);
-    put_escaped(t->l->page, text);
-    fprintf(t->l->page, "</%s>", kind);
-    if (!t->markdown)
-        return;
-    fputc(' ', t->markdown);
-    for (; *text; text++)
-        fputs(*text == '|' ? "\\|" : *text == '<' ? "&lt;" : (char[]){*text, 0}, t->markdown);
-    fputs(" |", t->markdown);
+    FILE *page = t->l->page, *markdown = t->markdown;
+    int count = 0;
+    fputs("<tr>", page);
+    for (char *cell = cells, *end = cells; end; cell = end + 1, count++) {
+        end = strchr(cell, '\t');
+        if (end)
+            *end = 0;
+        fprintf(page, "<%s>", kind);
+        put_escaped(page, cell);
+        fprintf(page, "</%s>", kind);
+        if (markdown)
+            fputs(count ? " " : "| ", markdown);
+        for (const char *at = cell; markdown && *at; at++)
+            fputs(*at == '|' ? "\\|" : *at == '<' ? "&lt;" : (char[]){*at, 0}, markdown);
+        if (markdown)
+            fputs(" |", markdown);
+    }
+    fputs("</tr>\n", page);
+    if (markdown)
+        fputs("\n", markdown);
+    return count;
 }
 
-void lab_table_begin_row(const lab_table *t)
+void lab_table_begin(const lab_table *t, const char *title, const char *format, ...)
 {
-    fputs("<tr>", t->l->page);
-    if (t->markdown)
-        fputs("|", t->markdown);
-}
-
-void lab_table_put(const lab_table *t, const char *format, ...)
-{
-    char text[2 * DRAPE_MESSAGE_SIZE];
+    char heads[2 * DRAPE_MESSAGE_SIZE];
     va_list values;
     va_start(values, format);
-    vsnprintf(text, sizeof text, format, values);
+    vsnprintf(heads, sizeof heads, format, values);
     va_end(values);
-    put_cell(t, "td", text);
-}
-
-void lab_table_end_row(const lab_table *t)
-{
-    fputs("</tr>\n", t->l->page);
-    if (t->markdown)
-        fputs("\n", t->markdown);
-}
-
-void lab_table_begin(const lab_table *t, const char *title, const char *const *heads)
-{
     lab_page_heading(t->l, title);
     fputs("<table>", t->l->page);
     if (t->markdown)
         fprintf(t->markdown, "\n%s\n\n", title);
-    lab_table_begin_row(t);
-    for (size_t i = 0; heads[i]; i++)
-        put_cell(t, "th", heads[i]);
-    lab_table_end_row(t);
-    for (size_t i = 0; t->markdown && heads[i]; i++)
+    const int count = put_row(t, "th", heads);
+    for (int i = 0; t->markdown && i < count; i++)
         fputs(i ? "---|" : "|---|", t->markdown);
     if (t->markdown)
         fputs("\n", t->markdown);
+}
+
+void lab_table_row(const lab_table *t, const char *format, ...)
+{
+    char cells[8 * DRAPE_MESSAGE_SIZE];
+    va_list values;
+    va_start(values, format);
+    vsnprintf(cells, sizeof cells, format, values);
+    va_end(values);
+    put_row(t, "td", cells);
 }
 
 void lab_table_end(const lab_table *t)

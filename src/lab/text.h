@@ -26,23 +26,21 @@ drape_status lab_write_csv(lab *l);
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);
-void lab_page_text(lab *l, const char *text); /* escaped */
 
 /* Adds a figure with its caption. */
 void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
-/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell nor
- * HTML. */
+/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell, unless
+ * it has a tab, nor HTML. */
 typedef struct lab_table {
     lab *l;
     FILE *markdown;
 } lab_table;
 
-/* heads: NULL-ended. */
-void lab_table_begin(const lab_table *t, const char *title, const char *const *heads);
-void lab_table_begin_row(const lab_table *t);
-void lab_table_put(const lab_table *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
-void lab_table_end_row(const lab_table *t);
+/* A row, whose cells the format separates by tabs: of the heads, and further ones. */
+void lab_table_begin(const lab_table *t, const char *title, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+void lab_table_row(const lab_table *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void lab_table_end(const lab_table *t);
 
 /* report.html of the summary and the body. */

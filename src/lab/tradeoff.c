@@ -58,22 +58,22 @@ static drape_status plan(lab *l)
 
 /* ---- Reading the results ---- */
 
-/* All series. */
+/* All series but those of linear solvers. */
 typedef struct all {
-    const lab_series *series;
+    lab_series *series;
     size_t count;
 } all;
 
-static bool is_linear(const lab_series *s)
+static bool is_resolved(const json_t *result)
 {
-    return strstr(s->name, "linear solver") != NULL;
+    return lab_is_good(result) &&
+           lab_number(result, "error_end_m") > RESOLVED * lab_number(result, "reference_error_m");
 }
 
 /* The error of a case if it can be distinguished from that of the reference; otherwise NaN. */
 static double resolved_error(const json_t *result)
 {
-    double error = lab_number(result, "error_end_m");
-    return lab_is_good(result) && error > RESOLVED * lab_number(result, "reference_error_m") ? error : NAN;
+    return is_resolved(result) ? lab_number(result, "error_end_m") : NAN;
 }
 
 /* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
@@ -82,7 +82,7 @@ static const json_t *cheapest(all a, double error, const lab_series *only)
 {
     const json_t *best = NULL;
     for (const lab_series *s = a.series; s < a.series + a.count; s++) {
-        if (is_linear(s) || s->count < FEWEST || (only && s != only))
+        if (s->count < FEWEST || (only && s != only))
             continue;
         for (size_t i = 0; i < s->count; i++)
             if (resolved_error(s->results[i]) <= error &&
@@ -151,7 +151,7 @@ static void report_sparse(lab *l, all a)
 {
     bool any = false;
     for (const lab_series *s = a.series; s < a.series + a.count; s++)
-        if (!is_linear(s) && s->count > 0 && s->count < FEWEST) {
+        if (s->count > 0 && s->count < FEWEST) {
             if (!any)
                 fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
             fprintf(l->summary, "%s %s (%zu)", any ? "," : "", s->name, s->count);
@@ -192,70 +192,54 @@ static void report_reference(lab *l)
 
 /* ---- Figures and the table ---- */
 
-static const struct chart {
-    const char *file, *x_label, *x_key, *y_label, *y_key;
-} charts[] = {
-    {"error_cpu", "CPU [s]", "cpu_s", "error at the end, RMS [m]", "error_end_m"},
-    {"error_l2_cpu", "CPU [s]", "cpu_s", "error over time, RMS [m]", "error_l2_m"},
-    {"error_residuals", "residuals", "residuals", "error at the end, RMS [m]", "error_end_m"},
-    {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
-};
-
-/* The curves are the series but those of linear solvers. */
-static drape_status draw(lab *l, all a, const struct chart *c)
-{
-    lab_figure f;
-    lab_figure_begin(l, &f, c->file);
-    for (const lab_series *s = a.series; s < a.series + a.count; s++) {
-        if (is_linear(s))
-            continue;
-        lab_figure_data(&f);
-        for (size_t i = 0; i < s->count; i++) {
-            const double x = lab_number(s->results[i], c->x_key), y = lab_number(s->results[i], c->y_key);
-            if (!isnan(resolved_error(s->results[i])) && x > 0 && y > 0)
-                lab_figure_point(&f, x, y);
-        }
-        lab_figure_series(&f, s->integrator, s->variant, s->name);
-    }
-    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
-    lab_figure_fit(&f, 0);
-    return lab_figure_end(l, &f, c->y_label);
-}
-
 static void write_table(lab *l)
 {
-    static const char *const heads[] = {"integrator",     "setting",           "status",     "error_end_m",
-                                        "error_l2_m",     "energy_drift",      "strain_max", "cpu_s",
-                                        "accepted",       "rejected",          "residuals",  "jacobians",
-                                        "factorizations", "linear_iterations", NULL};
+    static const char *const keys[] = {"error_end_m", "error_l2_m",     "energy_drift",     "strain_max",
+                                       "cpu_s",       "accepted",       "rejected",         "residuals",
+                                       "jacobians",   "factorizations", "linear_iterations"};
+    enum { KEYS = sizeof keys / sizeof *keys, OF_GOOD = 3 }; /* the first are those of completed cases */
     const lab_table t = {.l = l};
-    lab_table_begin(&t, "All cases", heads);
+    char knob[64], cells[32 * KEYS] = "";
+    for (size_t k = 0; k < KEYS; k++)
+        snprintf(cells + strlen(cells), sizeof cells - strlen(cells), "\t%s", keys[k]);
+    lab_table_begin(&t, "All cases", "integrator\tsetting\tstatus%s", cells);
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
-        char knob[64];
         if (!r)
             continue;
         lab_knob_text(r, knob);
-        lab_table_begin_row(&t);
-        lab_table_put(&t, "%s", lab_tag_text(r, "series"));
-        lab_table_put(&t, "%s", knob);
-        lab_table_put(&t, "%s", lab_text(r, "status"));
-        for (size_t k = 3; heads[k]; k++) {
-            const double value = lab_is_good(r) || k > 5 ? lab_number(r, heads[k]) : NAN;
-            lab_table_put(&t, isnan(value) ? "" : "%.4g", value);
+        *cells = 0;
+        for (size_t k = 0; k < KEYS; k++) {
+            const double value = lab_is_good(r) || k >= OF_GOOD ? lab_number(r, keys[k]) : NAN;
+            snprintf(cells + strlen(cells), sizeof cells - strlen(cells), isnan(value) ? "\t" : "\t%.4g",
+                     value);
         }
-        lab_table_end_row(&t);
+        lab_table_row(&t, "%s\t%s\t%s%s", lab_tag_text(r, "series"), knob, lab_text(r, "status"), cells);
     }
     lab_table_end(&t);
 }
 
 static drape_status report(lab *l)
 {
-    all a;
-    a.series = lab_list_series(l, NULL, &a.count);
+#define CPU  .x = "cpu_s", .x_label = "CPU [s]"
+#define ENDS .y = "error_end_m", .y_label = "error at the end, RMS [m]", .shows = is_resolved
+    static const lab_chart charts[] = {
+        {.name = "error_cpu", CPU, ENDS},
+        {.name = "error_l2_cpu",
+         CPU,
+         .y = "error_l2_m",
+         .y_label = "error over time, RMS [m]",
+         .shows = is_resolved},
+        {.name = "error_residuals", .x = "residuals", .x_label = "residuals", ENDS},
+        {.name = "error_jacobians", .x = "jacobians", .x_label = "Jacobians", ENDS},
+    };
+    size_t listed;
+    all a = {.series = lab_list_series(l, NULL, &listed)};
     if (!a.series)
         return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < listed; i++)
+        if (!strstr(a.series[i].name, "linear solver"))
+            a.series[a.count++] = a.series[i];
     const lab_series *usual = lab_find_series(a.series, a.count, BASE_METHOD);
     drape_status status = DRAPE_OK;
     report_headline(l, usual);
@@ -267,7 +251,7 @@ static drape_status report(lab *l)
     }
     report_reference(l);
     for (size_t i = 0; !status && i < sizeof charts / sizeof *charts; i++)
-        status = draw(l, a, &charts[i]);
+        status = lab_draw_series(l, &charts[i], a.series, a.count);
     write_table(l);
     return status;
 }
