@@ -33,37 +33,19 @@ typedef struct search {
     bool *taken; /* (basis) this pair is among the results */
 } search;
 
-static double dot(int64_t n, const double *a, const double *b)
-{
-    double sum = 0;
-    for (int64_t i = 0; i < n; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 /* Takes the known vectors out of x, twice, because one pass leaves rounding errors of a large part. */
 static void leave_known(const search *s, double *x)
 {
     for (int pass = 0; pass < 2; pass++)
         for (int32_t k = 0; k < s->known->count; k++) {
-            const double *u = s->known->vector + (int64_t)k * s->n;
-            const double share = dot(s->n, s->known->product + (int64_t)k * s->n, x);
+            const double *u = s->known->vector + (int64_t)k * s->n,
+                         *bu = s->known->product + (int64_t)k * s->n;
+            double share = 0;
+            for (int64_t i = 0; i < s->n; i++)
+                share += bu[i] * x[i];
             for (int64_t i = 0; i < s->n; i++)
                 x[i] -= share * u[i];
         }
-}
-
-/* Numbers between -1 and 1 without any symmetry that a mode might have: Knuth's linear congruential sequence.
- * Another one for each number of known vectors, since the last search may have begun without a part of what
- * it missed. */
-static void fill_start(const search *s)
-{
-    uint64_t state = 1 + (uint64_t)s->known->count;
-    for (int64_t i = 0; i < s->n; i++) {
-        state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-        s->residual[i] = (double)(state >> 11) / 4503599627370496.0 - 1;
-    }
-    leave_known(s, s->residual);
 }
 
 /* Runs the reverse communication to its end. Mode 3 stands for any operator that is symmetric in B: ARPACK
@@ -146,7 +128,15 @@ drape_status lab_eigen(drape_context *ctx, const lab_operator *op, const lab_kno
     s.taken = drape_arena_take(&arena, m, sizeof *s.taken);
     drape_status status = drape_arena_status(&arena);
     if (!status) {
-        fill_start(&s);
+        /* The start: numbers between -1 and 1 without any symmetry that a mode might have, Knuth's linear
+         * congruential sequence. Another one for each number of known vectors, since the last search may
+         * have begun without a part of what it missed. */
+        uint64_t state = 1 + (uint64_t)s.known->count;
+        for (int64_t i = 0; i < s.n; i++) {
+            state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+            s.residual[i] = (double)(state >> 11) / 4503599627370496.0 - 1;
+        }
+        leave_known(&s, s.residual);
         pthread_mutex_lock(&arpack_mutex);
         status = iterate(ctx, &s, parameters, pointers);
         if (!status)

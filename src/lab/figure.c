@@ -102,22 +102,17 @@ static void set_colour(const page *p, int colour)
                          (colour & 255) / 255.0);
 }
 
-/* A path through points x, y; NaN is a gap. */
-static void put_path(const page *p, const double *xy, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (i == 0 || isnan(xy[2 * i - 2]))
-            cairo_move_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
-        else if (!isnan(xy[2 * i]))
-            cairo_line_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
-}
-
+/* Lines through points x, y; NaN is a gap. */
 static void put_line(const page *p, const double *xy, size_t count, int colour, double width, int dash)
 {
     static const double dashes[][6] = {{3, 2.6}, {1, 2}, {4.5, 1.8, 1, 1.8}, {4.5, 1.5, 1, 1.5, 1, 1.5}};
     static const int pieces[] = {2, 2, 4, 6};
     const int kind = dash < 2 || dash > 5 ? -1 : dash - 2;
-    put_path(p, xy, count);
+    for (size_t i = 0; i < count; i++)
+        if (i == 0 || isnan(xy[2 * i - 2]))
+            cairo_move_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
+        else if (!isnan(xy[2 * i]))
+            cairo_line_to(p->cairo, across(xy[2 * i]), down(p, xy[2 * i + 1]));
     set_colour(p, colour);
     cairo_set_line_width(p->cairo, across(width));
     cairo_set_dash(p->cairo, kind < 0 ? NULL : dashes[kind], kind < 0 ? 0 : pieces[kind], 0);
@@ -308,15 +303,6 @@ static void put_axis(const page *p, const lab_axis *a, double x, double y, doubl
         put_log_ticks(&r);
     else if (a->name_count == 0)
         put_linear_ticks(&r);
-}
-
-/* The room that the numbers or names of the y axis need. */
-static double ticks_width(const lab_axis *a)
-{
-    double widest = text_width(a->log ? "10-10" : "0.0005");
-    for (int i = 0; i < a->name_count; i++)
-        widest = fmax(i ? widest : 0, text_width(a->names[i]));
-    return fmin(widest, WIDEST_NAME);
 }
 
 /* ---- Elements ---- */
@@ -535,7 +521,10 @@ static layout lay_out(const lab_figure *f)
     layout at = {.column = SAMPLE + widest + GAP};
     at.columns = (int)fmax(1, fmin(f->entries, floor((WIDTH - 2 + GAP) / at.column)));
     at.rows = (f->entries + at.columns - 1) / at.columns;
-    at.left = (*f->axes[1].label ? EM + 1.5 : 1) + ticks_width(&f->axes[1]) + TICK + 1;
+    double ticks = text_width(f->axes[1].log ? "10-10" : "0.0005"); /* numbers or names of the y axis */
+    for (int i = 0; i < f->axes[1].name_count; i++)
+        ticks = fmax(i ? ticks : 0, text_width(f->axes[1].names[i]));
+    at.left = (*f->axes[1].label ? EM + 1.5 : 1) + fmin(ticks, WIDEST_NAME) + TICK + 1;
     at.legend = LINE * at.rows + 1;
     at.scale = at.legend + EM + 1 + 1.5 * EM + TICK;
     at.bottom =
@@ -581,18 +570,6 @@ static void put_frame(const page *p, double left, double bottom, double right, d
 {
     put_line(p, (double[]){left, bottom, right, bottom, right, top, left, top, left, bottom, right, bottom},
              6, LAB_BLACK, THIN, 1);
-}
-
-/* The bar of colours, with numbers and label below it. */
-static void put_scale(const lab_figure *f, const layout *at, const page *p)
-{
-    const double right = WIDTH - RIGHT, width = right - at->left;
-    for (int k = 0; k < LAB_SHADES; k++) /* each to the end of the bar: no gaps */
-        put_box(p, at->left + width * k / LAB_SHADES, at->scale, right, at->scale + BAR,
-                scale_colour((k + 0.5) / LAB_SHADES));
-    put_frame(p, at->left, at->scale, right, at->scale + BAR);
-    put_axis(p, &f->scale, at->left, at->scale, width, false);
-    put_text(p, at->left + 0.5 * width, at->legend + 0.6 * EM, MIDDLE, f->scale.label, WIDTH, NULL);
 }
 
 /* Where a point of the axes is on the page. */
@@ -653,8 +630,15 @@ static void draw_page(const lab_figure *f, const layout *at, const page *p)
     put_axis(p, &f->axes[1], left, low, high - low, true);
     put_text(p, 0.5 * (left + right), (has_scale(f) ? at->scale + BAR : at->legend) + 0.6 * EM, MIDDLE,
              f->axes[0].label, WIDTH, NULL);
-    if (has_scale(f))
-        put_scale(f, at, p);
+    if (has_scale(f)) {
+        /* The bar of colours, with numbers and label below it. */
+        for (int k = 0; k < LAB_SHADES; k++) /* each to the end of the bar: no gaps */
+            put_box(p, left + (right - left) * k / LAB_SHADES, at->scale, right, at->scale + BAR,
+                    scale_colour((k + 0.5) / LAB_SHADES));
+        put_frame(p, left, at->scale, right, at->scale + BAR);
+        put_axis(p, &f->scale, left, at->scale, right - left, false);
+        put_text(p, left + 0.5 * (right - left), at->legend + 0.6 * EM, MIDDLE, f->scale.label, WIDTH, NULL);
+    }
     put_text(p, 0.7 * EM, 0.5 * (low + high), UPRIGHT, f->axes[1].label, at->height, NULL);
     put_text(p, 0.5 * (left + right), high + 0.5 * TITLE, MIDDLE, f->title, right - left, NULL);
     put_legend(f, at, p);

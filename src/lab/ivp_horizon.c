@@ -16,15 +16,6 @@
 #define STEPS        32    /* in an interval, of the implicit method */
 #define MOST_STEPS   40000 /* of the explicit method */
 
-/* SplitMix64 (Steele, Lea, Flood 2014), as a number in [-1, 1). */
-static double draw(uint64_t *seed)
-{
-    uint64_t z = *seed += UINT64_C(0x9e3779b97f4a7c15);
-    z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-    return ldexp((double)((z ^ z >> 31) >> 11), -52) - 1;
-}
-
 /* x + an offset of the free nodes, whose root mean square is PERTURBATION. */
 static void perturb(const lab_ivp *s, int direction, double *x)
 {
@@ -38,7 +29,11 @@ static void perturb(const lab_ivp *s, int direction, double *x)
         for (int32_t i = 0; i < count; i++) {
             nodes += !pass && !pinned[i];
             for (size_t k = 0; k < 3; k++) {
-                const double d = draw(&seed);
+                /* SplitMix64 (Steele, Lea, Flood 2014), as a number in [-1, 1). */
+                uint64_t z = seed += UINT64_C(0x9e3779b97f4a7c15);
+                z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+                z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+                const double d = ldexp((double)((z ^ z >> 31) >> 11), -52) - 1;
                 squares += pinned[i] || pass ? 0 : d * d;
                 x[3 * (size_t)i + k] += pinned[i] ? 0 : scale * d;
             }
@@ -114,22 +109,6 @@ static double find_horizon(const double *t, const double *growth, size_t count)
     return INFINITY;
 }
 
-static drape_status store(const lab_ivp *s, const json_t *settings, const double *t, const double *growth,
-                          size_t count, double horizon)
-{
-    const char *path = lab_ivp_file(s, "horizons", "json");
-    json_t *about = lab_ivp_provenance(s);
-    about = drape_json_with(about, "settings", json_deep_copy(settings));
-    about = drape_json_with(about, "perturbation", json_real(PERTURBATION));
-    about = drape_json_with(about, "limit", json_real(LIMIT));
-    about = drape_json_with(about, "horizon_s", drape_json_number(horizon)); /* null: beyond t_s */
-    about = drape_json_with(about, "t_s", drape_json_numbers(t, count));
-    about = drape_json_with(about, "growth", drape_json_numbers(growth, count));
-    drape_status status = path ? lab_ivp_write_json(s, path, about) : DRAPE_E_MEMORY;
-    json_decref(about);
-    return status;
-}
-
 drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
 {
     double t[SAMPLES], growth[SAMPLES] = {0}, largest = 0;
@@ -149,8 +128,18 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     const double horizon = find_horizon(t, growth, count);
     *within =
         !status && count > 0 && t[count - 1] >= duration * (1 - 1e-9) && horizon >= duration * (1 - 1e-9);
-    if (!status)
-        status = store(s, settings, t, growth, count, horizon);
+    if (!status) {
+        const char *path = lab_ivp_file(s, "horizons", "json");
+        json_t *about = lab_ivp_provenance(s);
+        about = drape_json_with(about, "settings", json_deep_copy(settings));
+        about = drape_json_with(about, "perturbation", json_real(PERTURBATION));
+        about = drape_json_with(about, "limit", json_real(LIMIT));
+        about = drape_json_with(about, "horizon_s", drape_json_number(horizon)); /* null: beyond t_s */
+        about = drape_json_with(about, "t_s", drape_json_numbers(t, count));
+        about = drape_json_with(about, "growth", drape_json_numbers(growth, count));
+        status = path ? lab_ivp_write_json(s, path, about) : DRAPE_E_MEMORY;
+        json_decref(about);
+    }
     if (!status && isfinite(horizon))
         fprintf(out, "horizon   %.4g s: a perturbation of %.0e of the size grows %.0e-fold\n", horizon,
                 PERTURBATION, LIMIT);

@@ -7,7 +7,6 @@
  */
 #include "base/clock.h"
 #include "base/hash.h"
-#include "base/param.h"
 #include "io/npy.h"
 #include "lab/ivp.h"
 #include "lab/lab.h"
@@ -59,9 +58,9 @@ static json_t *settings_of(const lab_ivp *s, const family *f, double knob)
     json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", f->method,
                                  f->rtol > 0 ? "/integrator/rtol" : "/integrator/dt", knob);
     snprintf(pointer, sizeof pointer, "/integrator/%s", f->also ? f->also : "");
-    if (f->also && drape_param_find(entry->params, entry->param_count, f->also) >= 0)
+    if (f->also && lab_has_param(entry, f->also))
         json_object_set_new(settings, pointer, json_integer(f->also_value));
-    if (drape_param_find(entry->params, entry->param_count, "tolerance") >= 0)
+    if (lab_has_param(entry, "tolerance"))
         json_object_set_new(settings, "/integrator/tolerance", json_real(lab_ivp_least_tolerance(s)));
     return settings;
 }
@@ -155,15 +154,6 @@ static drape_status refine(const lab_ivp *s, double seconds, const attempt *atte
 
 /* ---- The choice ---- */
 
-static const attempt *choose(const attempt *attempts, int count)
-{
-    const attempt *best = NULL;
-    for (int i = 0; i < count; i++)
-        if (attempts[i].count > 1 && (!best || attempts[i].change < best->change))
-            best = &attempts[i];
-    return best;
-}
-
 static json_t *describe(const lab_ivp *s, const attempt *attempts, int count, const attempt *best)
 {
     json_t *methods = json_array();
@@ -245,7 +235,10 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
     }
     if (status)
         return status;
-    const attempt *best = choose(attempts, count);
+    const attempt *best = NULL;
+    for (int i = 0; i < count; i++)
+        if (attempts[i].count > 1 && (!best || attempts[i].change < best->change))
+            best = &attempts[i];
     const double error = disagreement(s, attempts, count, best), goal = goal_of(s);
     if (!isfinite(error))
         return drape_fail(s->arena->ctx, DRAPE_E_SOLVER,

@@ -82,44 +82,8 @@ static double frame_error(const lab_ivp *s, const double *x, size_t i, double *l
     return lab_distance(s->model, a, b) / s->size;
 }
 
-/* {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...], "error_end",
+/* As JSON: {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...], "error_end",
  * "error_max", "mescd", "reference_error", "resolved"} */
-static drape_status print_json(const lab_ivp *s, const double *x, json_t *score, FILE *out)
-{
-    json_t *errors = json_array(), *largest = json_array();
-    for (size_t i = 0; i < s->time_count; i++) {
-        double far;
-        errors = drape_json_append(errors, json_real(frame_error(s, x, i, &far)));
-        largest = drape_json_append(largest, json_real(far));
-    }
-    json_t *all = drape_json_with(json_object(), "scene", drape_json_text(s->name));
-    all = drape_json_with(all, "scene_hash", json_string(s->hash));
-    all = drape_json_with(all, "size_m", json_real(s->size));
-    all = drape_json_with(all, "times_s", drape_json_numbers(s->times, s->time_count));
-    all = drape_json_with(all, "error", errors);
-    all = drape_json_with(all, "error_largest", largest);
-    const bool failed = !all || json_object_update(all, score) ||
-                        json_dumpf(all, out, JSON_ENSURE_ASCII | JSON_INDENT(2) | JSON_REAL_PRECISION(15));
-    fputs("\n", out);
-    json_decref(all);
-    return failed ? drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "the score cannot be printed") : DRAPE_OK;
-}
-
-static void print_text(const lab_ivp *s, const double *x, const json_t *score, FILE *out)
-{
-    fprintf(out, "time_s,error,error_largest\n");
-    for (size_t i = 0; i < s->time_count; i++) {
-        double far;
-        const double error = frame_error(s, x, i, &far);
-        fprintf(out, "%.9g,%.6g,%.6g\n", s->times[i], error, far);
-    }
-    fprintf(out, "error_end %.6g\nerror_max %.6g\nmescd %.4g\nreference_error %.2g\n",
-            lab_number(score, "error_end"), lab_number(score, "error_max"),
-            json_is_null(json_object_get(score, "mescd")) ? INFINITY : lab_number(score, "mescd"), s->error);
-    if (!json_boolean_value(json_object_get(score, "resolved")))
-        fprintf(out, "The error cannot be distinguished from that of the reference.\n");
-}
-
 drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out)
 {
     double *x = NULL, worst = 0, error = 0, far;
@@ -130,23 +94,41 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
         status = lab_ivp_take_frames(s, path, bytes, size, &x);
     if (status)
         return status;
+    json_t *errors = json_array(), *largest = json_array();
+    if (!json)
+        fprintf(out, "time_s,error,error_largest\n");
     for (size_t i = 0; i < s->time_count; i++) {
         error = frame_error(s, x, i, &far);
         worst = fmax(worst, error);
+        errors = drape_json_append(errors, json_real(error));
+        largest = drape_json_append(largest, json_real(far));
+        if (!json)
+            fprintf(out, "%.9g,%.6g,%.6g\n", s->times[i], error, far);
     }
-    /* Infinitely many digits, of the reference itself, are null in JSON. */
-    json_t *score =
-        json_pack("{s:f, s:f, s:o, s:f, s:b}", "error_end", error, "error_max", worst, "mescd",
-                  drape_json_number(lab_correct_digits(s->model, x + s->reference.size * (s->time_count - 1),
-                                                       lab_trace_end(&s->reference))),
-                  "reference_error", s->error, "resolved", !(worst < s->error));
-    if (!score)
-        status = drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for the score");
-    else if (json)
-        status = print_json(s, x, score, out);
-    else
-        print_text(s, x, score, out);
-    json_decref(score);
+    const double digits = lab_correct_digits(s->model, x + s->reference.size * (s->time_count - 1),
+                                             lab_trace_end(&s->reference));
+    json_t *all = drape_json_with(json_object(), "scene", drape_json_text(s->name));
+    all = drape_json_with(all, "scene_hash", json_string(s->hash));
+    all = drape_json_with(all, "size_m", json_real(s->size));
+    all = drape_json_with(all, "times_s", drape_json_numbers(s->times, s->time_count));
+    all = drape_json_with(all, "error", errors);
+    all = drape_json_with(all, "error_largest", largest);
+    all = drape_json_with(all, "error_end", json_real(error));
+    all = drape_json_with(all, "error_max", json_real(worst));
+    all = drape_json_with(all, "mescd",
+                          drape_json_number(digits)); /* null: infinitely many, of the reference itself */
+    all = drape_json_with(all, "reference_error", json_real(s->error));
+    all = drape_json_with(all, "resolved", json_boolean(!(worst < s->error)));
+    if (!json) {
+        fprintf(out, "error_end %.6g\nerror_max %.6g\nmescd %.4g\nreference_error %.2g\n", error, worst,
+                digits, s->error);
+        if (worst < s->error)
+            fprintf(out, "The error cannot be distinguished from that of the reference.\n");
+    } else if (!all || json_dumpf(all, out, JSON_ENSURE_ASCII | JSON_INDENT(2) | JSON_REAL_PRECISION(15)))
+        status = drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "the score cannot be printed");
+    if (json)
+        fputs("\n", out);
+    json_decref(all);
     return status;
 }
 
@@ -224,25 +206,6 @@ static bool writes(const void *user, const char *name)
     return false;
 }
 
-/* One file after the other; the first failure ends it. */
-static drape_status put_all(const lab_ivp *s, const double *v, drape_folder *folder)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < EXPORTS; i++) {
-        const char *ending = exports[i].reference;
-        drape_file file = {0};
-        status = drape_export_begin(s->arena->ctx, folder, exports[i].name, &file);
-        if (!status && exports[i].put)
-            exports[i].put(s, v, &file);
-        else if (!status)
-            status = copy(s, ending ? lab_ivp_file(s, "references", ending) : s->path, &file);
-        if (!status)
-            status = drape_file_finish(&file);
-        drape_file_destroy(&file);
-    }
-    return status;
-}
-
 drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
 {
     drape_folder *folder = NULL;
@@ -256,8 +219,18 @@ drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
         status = drape_folder_check(folder, writes, writes, NULL);
     if (!status)
         status = drape_folder_begin(folder, writes, NULL);
-    if (!status)
-        status = put_all(s, drape_sim_velocities(sim), folder);
+    for (size_t i = 0; !status && i < EXPORTS; i++) {
+        const char *ending = exports[i].reference;
+        drape_file file = {0};
+        status = drape_export_begin(s->arena->ctx, folder, exports[i].name, &file);
+        if (!status && exports[i].put)
+            exports[i].put(s, drape_sim_velocities(sim), &file);
+        else if (!status)
+            status = copy(s, ending ? lab_ivp_file(s, "references", ending) : s->path, &file);
+        if (!status)
+            status = drape_file_finish(&file);
+        drape_file_destroy(&file);
+    }
     if (!status) {
         char shown[4096];
         snprintf(shown, sizeof shown, "%s", path);

@@ -33,28 +33,6 @@ static drape_status make_times(lab_ivp *s)
     return s->times ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-static double mean_mass(const drape_model *model)
-{
-    const double *masses = drape_model_masses(model);
-    const int32_t count = drape_model_node_count(model);
-    double sum = 0;
-    for (int32_t i = 0; i < count; i++)
-        sum += masses[i];
-    return sum / count;
-}
-
-/* The name as it is shown and stored: printable, and in UTF-8. */
-static const char *shown_name(drape_arena *arena, const char *name)
-{
-    char *copy = drape_arena_text(arena, name);
-    if (copy)
-        drape_make_printable(copy);
-    json_t *text = copy ? drape_json_text(copy) : NULL;
-    const char *shown = text ? drape_arena_text(arena, json_string_value(text)) : NULL;
-    json_decref(text);
-    return shown;
-}
-
 drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
 {
     char *name;
@@ -64,7 +42,13 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
     if (!s->path || !name)
         return DRAPE_E_MEMORY;
     name[strrchr(name, '.') ? (size_t)(strrchr(name, '.') - name) : strlen(name)] = 0;
-    s->name = shown_name(arena, name);
+    /* The name as it is shown and stored: printable, and in UTF-8. */
+    char *copy = drape_arena_text(arena, name);
+    if (copy)
+        drape_make_printable(copy);
+    json_t *text = copy ? drape_json_text(copy) : NULL;
+    s->name = text ? drape_arena_text(arena, json_string_value(text)) : NULL;
+    json_decref(text);
     if (!s->name)
         return DRAPE_E_MEMORY;
     drape_status status = drape_model_load(arena->ctx, path, &s->model);
@@ -73,7 +57,9 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
     if (status)
         return status;
     s->size = s->model->length;
-    s->node_mass = mean_mass(s->model);
+    for (int32_t i = 0; i < s->model->node_count; i++)
+        s->node_mass += s->model->mass[i];
+    s->node_mass /= s->model->node_count;
     s->contact = s->model->collider_count > 0 || s->model->contact.self;
     for (int32_t i = 0; i < s->model->event_count; i++)
         if (s->model->events[i].action != DRAPE_ACTION_RECORD)

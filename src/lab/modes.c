@@ -172,12 +172,6 @@ static drape_status prepare_buckling(problem *p)
 
 /* ---- Search ---- */
 
-/* l or f of a pair. */
-static double value_of(const problem *p, const eigenpair *pair)
-{
-    return p->shift + 1 / pair->op;
-}
-
 static drape_status grow(problem *p, int32_t wanted)
 {
     const size_t n = (size_t)p->n, room = (size_t)(p->count + wanted);
@@ -223,31 +217,21 @@ static drape_status search(problem *p, int32_t wanted)
     return status;
 }
 
-/* The widest gap behind the wanted pairs; 0: behind the last one there is. *behind: how many are before it.
- * Returns its width relative to the distance from the shift. */
-static double widest_gap(const problem *p, int32_t wanted, int32_t *behind)
-{
-    double widest = 0;
-    *behind = 0;
-    for (int32_t k = wanted; k < p->count; k++) {
-        const double gap = p->pairs[k - 1].op / p->pairs[k].op - 1;
-        if (gap > widest) {
-            widest = gap;
-            *behind = k;
-        }
-    }
-    return widest;
-}
-
-/* Counts all eigenvalues up to a gap behind the wanted ones, and those missing among the pairs;
- * *missing -1: it is not
- * known here. */
+/* Counts all eigenvalues up to a gap behind the wanted ones, and those missing among the pairs; *missing -1: it
+ * is not known here. */
 static drape_status find_missing(const problem *p, int32_t wanted, int64_t *missing, int64_t *below)
 {
-    int32_t behind;
     int64_t negative;
     bool known;
-    const double gap = widest_gap(p, wanted, &behind);
+    /* The widest gap behind the wanted pairs, relative to the distance from the shift, and how many are before
+     * it; 0: there is none. */
+    double gap = 0;
+    int32_t behind = 0;
+    for (int32_t k = wanted; k < p->count; k++) {
+        const double width = p->pairs[k - 1].op / p->pairs[k].op - 1;
+        behind = width > gap ? k : behind;
+        gap = fmax(gap, width);
+    }
     *missing = -1;
     if (p->count < wanted) {
         *missing = wanted - p->count;
@@ -387,7 +371,7 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
 {
     const double *u = p->vector + (int64_t)pair->vector * p->n;
     double inverse = 0, mass = 0;
-    mode->value = value_of(p, pair);
+    mode->value = p->shift + 1 / pair->op;
     drape_status status = inverse_error(p, pair, &inverse);
     if (status)
         return status;
@@ -461,17 +445,6 @@ static drape_status fill(problem *p, int32_t count, int64_t below, drape_modes *
 
 /* ---- The driver ---- */
 
-static void measure_stiffness(problem *p)
-{
-    const drape_pattern *pattern = p->tangent.pattern;
-    for (int32_t j = 0; j < pattern->block_count; j++) {
-        int64_t stride;
-        const double *block = drape_pattern_at(pattern, p->tangent.values, j, pattern->diagonal[j], &stride);
-        for (int k = 0; k < 3; k++)
-            p->stiffest = fmax(p->stiffest, fabs(block[k * stride + k]) / p->tangent.mass[3 * j + k]);
-    }
-}
-
 static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *def, drape_modes *out)
 {
     int64_t below = 0;
@@ -489,7 +462,13 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
     p->scratch = drape_arena_take(&p->arena, (size_t)p->n, sizeof *p->scratch);
     if (drape_arena_status(&p->arena))
         return DRAPE_E_MEMORY;
-    measure_stiffness(p);
+    const drape_pattern *pattern = p->tangent.pattern;
+    for (int32_t j = 0; j < pattern->block_count; j++) {
+        int64_t stride;
+        const double *block = drape_pattern_at(pattern, p->tangent.values, j, pattern->diagonal[j], &stride);
+        for (int k = 0; k < 3; k++)
+            p->stiffest = fmax(p->stiffest, fabs(block[k * stride + k]) / p->tangent.mass[3 * j + k]);
+    }
     if (!(p->stiffest > 0))
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT, "nothing in this scene has a stiffness");
     status = p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
@@ -499,13 +478,6 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
     if (!status)
         status = search_all(p, def->count, &below);
     return status ? status : fill(p, def->count, below, out);
-}
-
-static drape_status check(const drape_context *ctx, const drape_modes_def *def)
-{
-    (void)ctx;
-    return def->count >= 1 && isfinite(def->load_factor) && def->load_factor >= 0 ? DRAPE_OK
-                                                                                  : DRAPE_E_ARGUMENT;
 }
 
 void drape_modes_def_init(drape_modes_def *def, size_t struct_size)
@@ -525,7 +497,7 @@ drape_status drape_sim_modes(drape_sim *sim, const drape_modes_def *given, drape
     drape_modes_def_init(&def, sizeof def);
     if (given)
         memcpy(&def, given, given->struct_size < sizeof def ? given->struct_size : sizeof def);
-    if (check(sim->ctx, &def))
+    if (!(def.count >= 1 && isfinite(def.load_factor) && def.load_factor >= 0))
         return drape_fail(
             sim->ctx, DRAPE_E_ARGUMENT,
             "drape_sim_modes: count = %d and load_factor = %g; they are at least 1 and at least 0",

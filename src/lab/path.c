@@ -117,24 +117,18 @@ static double correct_factor(const follower *p, control by)
     return -dot(p, normal, p->a) / dot(p, normal, p->b);
 }
 
-/* Whether the forces at the trial are an equilibrium; they are in p->force. *residual [N]. */
-static bool converged(follower *p, double *residual)
-{
-    const double factor = p->point.factor + p->change;
-    const double forces = lab_tangent_evaluate(&p->tangent, p->x, factor, p->force, p->load, NULL);
-    const double loads = largest(p->load, p->n), scale = fmax(forces, fabs(factor) * loads);
-    const double rounding = fmin(p->rounding, MAX_ROUNDING * fmax(fabs(factor), p->def->step) * loads);
-    *residual = drape_all_finite(p->force, p->n) ? largest(p->force, p->n) : INFINITY;
-    return *residual <= fmax(p->def->tolerance * scale, rounding);
-}
-
 /* Corrects the step so far until its end is an equilibrium. limit [m]: of a correction. DRAPE_RETRY_* if that
  * fails. */
 static drape_status correct(follower *p, control by, double limit, drape_path_point *point)
 {
     for (point->iterations = 0; point->iterations <= MAX_ITERATIONS; point->iterations++) {
         place(p);
-        if (converged(p, &point->residual))
+        const double at = p->point.factor + p->change;
+        const double forces = lab_tangent_evaluate(&p->tangent, p->x, at, p->force, p->load, NULL);
+        const double loads = largest(p->load, p->n), scale = fmax(forces, fabs(at) * loads);
+        const double rounding = fmin(p->rounding, MAX_ROUNDING * fmax(fabs(at), p->def->step) * loads);
+        point->residual = drape_all_finite(p->force, p->n) ? largest(p->force, p->n) : INFINITY;
+        if (point->residual <= fmax(p->def->tolerance * scale, rounding))
             return DRAPE_OK;
         if (!isfinite(point->residual))
             return DRAPE_RETRY_NONFINITE;
@@ -179,21 +173,6 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
     return status;
 }
 
-/* Where the number of unstable modes changes, K was singular in between: at a limit point if the factor rises
- * along the tangent at one end of the step and falls at the other. Without that number, a limit is noted when
- * the factor has turned round, in this step or in the one before. */
-static drape_status find_event(follower *p, drape_path_point *point)
-{
-    const bool known = p->point.unstable >= 0 && point->unstable >= 0;
-    const bool turned = p->moved && p->change * p->change_before < 0;
-    point->event = turned && p->point.event != DRAPE_PATH_LIMIT ? DRAPE_PATH_LIMIT : DRAPE_PATH_REGULAR;
-    if (point->number == 0 || !known || p->point.unstable == point->unstable)
-        return DRAPE_OK;
-    drape_status status = factor(p);
-    point->event = dot(p, p->step, p->b) * p->direction < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_BIFURCATION;
-    return status;
-}
-
 /* What the end of a converged step would be as a point. DRAPE_RETRY_DEGENERATE: it cannot
  * be one. */
 static drape_status examine(follower *p, drape_path_point *point)
@@ -208,7 +187,19 @@ static drape_status examine(follower *p, drape_path_point *point)
     if (!status)
         status = count_unstable(p, point->factor, &point->unstable);
     point->number = p->point.number + 1;
-    return status ? status : find_event(p, point);
+    if (status)
+        return status;
+    /* Where the number of unstable modes changes, K was singular in between: at a limit point if the
+     * factor rises along the tangent at one end of the step and falls at the other. Without that number, a
+     * limit is noted when the factor has turned round, in this step or in the one before. */
+    const bool known = p->point.unstable >= 0 && point->unstable >= 0;
+    const bool turned = p->moved && p->change * p->change_before < 0;
+    point->event = turned && p->point.event != DRAPE_PATH_LIMIT ? DRAPE_PATH_LIMIT : DRAPE_PATH_REGULAR;
+    if (point->number == 0 || !known || p->point.unstable == point->unstable)
+        return DRAPE_OK;
+    status = factor(p);
+    point->event = dot(p, p->step, p->b) * p->direction < 0 ? DRAPE_PATH_LIMIT : DRAPE_PATH_BIFURCATION;
+    return status;
 }
 
 /* Makes the end of the step the state of the sim, and reports it. *ended: the observer wants no more. */
@@ -263,13 +254,6 @@ static double limit_of(const follower *p)
     return MAX_CORRECTION * norm(p, p->step);
 }
 
-/* Whether a step has left the direction of its prediction: the correction has then found another part of the
- * path, such as the one that leads back. */
-static bool turns_away(const follower *p)
-{
-    return dot(p, p->step, p->ahead) < LEAST_COSINE * norm(p, p->step) * norm(p, p->ahead);
-}
-
 /* Tries a step of that length from the last point. */
 static drape_status attempt(follower *p, double length, drape_path_point *point)
 {
@@ -279,16 +263,12 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
     predict(p, length);
     memcpy(p->ahead, p->step, p->n * sizeof *p->step);
     status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
-    if (!status && !p->def->load_control && turns_away(p))
+    /* A step that has left the direction of its prediction has found another part of the path, such as the
+     * one that leads back. */
+    if (!status && !p->def->load_control &&
+        dot(p, p->step, p->ahead) < LEAST_COSINE * norm(p, p->step) * norm(p, p->ahead))
         return DRAPE_RETRY_NONLINEAR;
     return status ? status : examine(p, point);
-}
-
-/* Whether the step so far passes the last factor. */
-static bool passes_end(const follower *p)
-{
-    const double left = p->def->to - p->point.factor;
-    return left != 0 && p->change * left > 0 && fabs(p->change) >= fabs(left);
 }
 
 /* The step so far, shortened to end at the last factor. */
@@ -301,29 +281,6 @@ static drape_status end_at(follower *p, drape_path_point *point)
     p->change = p->def->to - p->point.factor;
     drape_status status = correct(p, CONTROL_LOAD, limit, point);
     return status ? status : examine(p, point);
-}
-
-/* Loads so small that rounding of the cloth's own forces hides them have no path. Those that are 0 are found
- * by what they do. */
-static drape_status check_loads(follower *p)
-{
-    const drape_state *now = drape_sim_state(p->sim);
-    lab_tangent_evaluate(&p->tangent, now->x, 0, NULL, p->load, NULL);
-    const double most = fmax(fabs(p->def->from), fabs(p->def->to)) * largest(p->load, p->n);
-    return !(most > 0 && most < p->rounding)
-               ? DRAPE_OK
-               : drape_fail(p->ctx, DRAPE_E_ARGUMENT,
-                            "the loads are at most %.3g N on a node, less than rounding leaves of the "
-                            "cloth's own forces, %.3g N: a path needs larger loads",
-                            most, p->rounding);
-}
-
-static drape_status too_small(const follower *p, drape_status why)
-{
-    return drape_fail(p->ctx, DRAPE_E_STEP_TOO_SMALL,
-                      "factor %.9g: steps along the path fail, however short (%s)%s", p->point.factor,
-                      drape_status_name(why),
-                      p->def->load_control ? "; at a limit point, load control cannot go on" : "");
 }
 
 /* ---- A branch ---- */
@@ -446,14 +403,20 @@ static drape_status follow(follower *p)
     while (!status && !ended && p->point.number + 1 < p->def->max_points && p->point.factor != p->def->to) {
         drape_path_point point = {0};
         drape_status tried = attempt(p, length, &point);
-        const bool last = !tried && passes_end(p);
+        const double left = p->def->to - p->point.factor;
+        const bool last = !tried && left != 0 && p->change * left > 0 && fabs(p->change) >= fabs(left);
         if (last)
             tried = end_at(p, &point);
         if (tried < 0)
             return tried;
         if (tried) {
             length /= 2;
-            status = length >= LEAST_STEP * fmin(first, longest) ? DRAPE_OK : too_small(p, tried);
+            if (!(length >= LEAST_STEP * fmin(first, longest)))
+                return drape_fail(p->ctx, DRAPE_E_STEP_TOO_SMALL,
+                                  "factor %.9g: steps along the path fail, however short (%s)%s",
+                                  p->point.factor, drape_status_name(tried),
+                                  p->def->load_control ? "; at a limit point, load control cannot go on"
+                                                       : "");
             continue;
         }
         if (point.event == DRAPE_PATH_BIFURCATION && !switched) {
@@ -470,18 +433,6 @@ static drape_status follow(follower *p)
         length = fmin(length, longest);
     }
     return status;
-}
-
-static double stiffest_row(const lab_tangent *t)
-{
-    double most = 0;
-    for (int64_t j = 0; j < t->pattern->n; j++) {
-        double sum = 0;
-        for (int64_t k = t->pattern->column[j]; k < t->pattern->column[j + 1]; k++)
-            sum += fabs(t->values[k]);
-        most = fmax(most, sum);
-    }
-    return most;
 }
 
 static drape_status open(follower *p)
@@ -506,9 +457,25 @@ static drape_status open(follower *p)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < p->n; i++)
         p->mass += p->tangent.mass[i] / 3;
-    p->rounding = ROUNDINGS * DBL_EPSILON * stiffest_row(&p->tangent) * m->length;
-    status = check_loads(p);
-    return status ? status : p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
+    double stiffest = 0;
+    for (int64_t j = 0; j < p->tangent.pattern->n; j++) {
+        double sum = 0;
+        for (int64_t k = p->tangent.pattern->column[j]; k < p->tangent.pattern->column[j + 1]; k++)
+            sum += fabs(p->tangent.values[k]);
+        stiffest = fmax(stiffest, sum);
+    }
+    p->rounding = ROUNDINGS * DBL_EPSILON * stiffest * m->length;
+    /* Loads so small that rounding of the cloth's own forces hides them have no path. Those that are 0 are
+     * found by what they do. */
+    lab_tangent_evaluate(&p->tangent, drape_sim_state(p->sim)->x, 0, NULL, p->load, NULL);
+    const double most = fmax(fabs(p->def->from), fabs(p->def->to)) * largest(p->load, p->n);
+    if (most > 0 && most < p->rounding)
+        return drape_fail(
+            p->ctx, DRAPE_E_ARGUMENT,
+            "the loads are at most %.3g N on a node, less than rounding leaves of the cloth's own "
+            "forces, %.3g N: a path needs larger loads",
+            most, p->rounding);
+    return p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
 }
 
 void drape_path_def_init(drape_path_def *def, size_t struct_size)
@@ -517,14 +484,6 @@ void drape_path_def_init(drape_path_def *def, size_t struct_size)
         .struct_size = struct_size, .to = 1, .step = 0.05, .max_points = 1000, .tolerance = 1e-8};
     if (def)
         memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
-}
-
-static bool is_valid(const drape_path_def *def)
-{
-    return isfinite(def->from) && isfinite(def->to) && def->from != def->to && def->step > 0 &&
-           isfinite(def->step) && def->max_arc >= 0 && isfinite(def->max_arc) && def->max_points >= 1 &&
-           def->tolerance > 0 && def->tolerance < 1 && def->branch >= -1 && def->branch <= 1 &&
-           !(def->branch && def->load_control);
 }
 
 drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
@@ -536,7 +495,10 @@ drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
     drape_path_def_init(&def, sizeof def);
     if (given)
         memcpy(&def, given, given->struct_size < sizeof def ? given->struct_size : sizeof def);
-    if (!is_valid(&def))
+    if (!(isfinite(def.from) && isfinite(def.to) && def.from != def.to && def.step > 0 &&
+          isfinite(def.step) && def.max_arc >= 0 && isfinite(def.max_arc) && def.max_points >= 1 &&
+          def.tolerance > 0 && def.tolerance < 1 && def.branch >= -1 && def.branch <= 1 &&
+          !(def.branch && def.load_control)))
         return drape_fail(
             sim->ctx, DRAPE_E_ARGUMENT,
             "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "

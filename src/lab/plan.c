@@ -185,20 +185,6 @@ static plan make_plan(const lab *l, const size_t *sample, size_t sampled)
     return p;
 }
 
-static drape_status write_json(lab *l, const plan *p)
-{
-    const struct {
-        const char *key;
-        double value;
-    } reals[] = {{"cpu_s", p->cpu.value},   {"cpu_low_s", p->cpu.low},   {"cpu_high_s", p->cpu.high},
-                 {"elapsed_s", p->elapsed}, {"memory_bytes", p->memory}, {"disk_bytes", p->disk}};
-    json_t *all = json_pack("{s:I, s:I, s:i}", "cases", (json_int_t)p->cases, "sampled",
-                            (json_int_t)p->sampled, "jobs", p->jobs);
-    for (size_t i = 0; i < sizeof reals / sizeof *reals; i++)
-        json_object_set_new(all, reals[i].key, drape_json_number(reals[i].value));
-    return lab_write_json(l, "plan.json", all, JSON_INDENT(1) | JSON_REAL_PRECISION(6));
-}
-
 /* "3.2 hours" */
 static void time_text(double s, char text[32])
 {
@@ -232,5 +218,14 @@ drape_status lab_write_plan(lab *l)
             "          %.3g MB of memory, %.3g MB on disk besides figures and page\n"
             "          the same command without --plan keeps these cases and runs the others\n",
             1e-6 * p.memory, 1e-6 * p.disk);
-    return write_json(l, &p);
+    const struct {
+        const char *key;
+        double value;
+    } reals[] = {{"cpu_s", p.cpu.value},   {"cpu_low_s", p.cpu.low},   {"cpu_high_s", p.cpu.high},
+                 {"elapsed_s", p.elapsed}, {"memory_bytes", p.memory}, {"disk_bytes", p.disk}};
+    json_t *all = json_pack("{s:I, s:I, s:i}", "cases", (json_int_t)p.cases, "sampled", (json_int_t)p.sampled,
+                            "jobs", p.jobs);
+    for (size_t i = 0; i < sizeof reals / sizeof *reals; i++)
+        json_object_set_new(all, reals[i].key, drape_json_number(reals[i].value));
+    return lab_write_json(l, "plan.json", all, JSON_INDENT(1) | JSON_REAL_PRECISION(6));
 }

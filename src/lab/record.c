@@ -71,29 +71,6 @@ static bool belongs_to(const json_t *line, const lab_record *record)
     return strcmp(lab_text(line, "scene_hash"), digits) == 0;
 }
 
-/* A line that is not JSON, as a kill may leave the last, is ignored. */
-static void take_lines(char *text, lab_record *records, size_t count)
-{
-    char *rest = NULL;
-    for (char *word = strtok_r(text, "\n", &rest); word; word = strtok_r(NULL, "\n", &rest)) {
-        json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
-        for (size_t i = 0; line && i < count; i++) {
-            lab_record *record = &records[i];
-            drape_validation *v = &record->v;
-            if (record->done || !belongs_to(line, record))
-                continue;
-            *v = (drape_validation){.parameter = record->reference->parameters[record->index],
-                                    .obtained = lab_number(line, "obtained"),
-                                    .seconds = lab_number(line, "cpu_s")};
-            snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
-            drape_make_printable(v->message);
-            drape_validate_judge(record->reference, v);
-            record->done = true;
-        }
-        json_decref(line);
-    }
-}
-
 static bool is_cases(const void *user, const char *name)
 {
     (void)user;
@@ -109,8 +86,26 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
     drape_status status = drape_folder_open(ctx, path, false, folder);
     if (!status)
         status = drape_folder_check(*folder, is_cases, NULL, NULL);
-    if (!status && !lab_read_text(&arena, path, NAME, &text, &size))
-        take_lines(text, records, count);
+    if (!status && !lab_read_text(&arena, path, NAME, &text, &size)) {
+        char *rest = NULL;
+        for (char *word = strtok_r(text, "\n", &rest); word; word = strtok_r(NULL, "\n", &rest)) {
+            json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
+            for (size_t i = 0; line && i < count; i++) {
+                lab_record *record = &records[i];
+                drape_validation *v = &record->v;
+                if (record->done || !belongs_to(line, record))
+                    continue;
+                *v = (drape_validation){.parameter = record->reference->parameters[record->index],
+                                        .obtained = lab_number(line, "obtained"),
+                                        .seconds = lab_number(line, "cpu_s")};
+                snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
+                drape_make_printable(v->message);
+                drape_validate_judge(record->reference, v);
+                record->done = true;
+            }
+            json_decref(line);
+        }
+    }
     drape_arena_free(&arena);
     if (!status)
         status = drape_folder_begin(*folder, NULL, NULL);

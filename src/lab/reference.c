@@ -45,13 +45,6 @@ typedef struct level {
     char failure[200]; /* the message of a run that failed */
 } level;
 
-/* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
-static double deadline_of(const lab *l, int i)
-{
-    const double budget = l->def->budget_seconds;
-    return budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
-}
-
 /* The limit that the next level, which is expected to take GROWTH times the last one, would exceed. */
 static limit next_limit(const lab *l, const level *last, double deadline)
 {
@@ -196,7 +189,9 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
 /* Refines a sequence as far as is useful. */
 static drape_status refine_all(lab *l, const drape_model *model, int i, level *last)
 {
-    const double deadline = deadline_of(l, i);
+    /* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
+    const double budget = l->def->budget_seconds;
+    const double deadline = budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
     drape_status status = DRAPE_OK;
     *last = (level){.error = INFINITY};
     read_saved(l, model, &sequences[i], last);

@@ -140,20 +140,6 @@ static int miss(const gsl_vector *u, void *share, gsl_vector *out)
     return status;
 }
 
-/* The mode in which a clamped and pinned column buckles, of that size: theta is -f (1 - cos k s)/k^2 + f
- * sin(k s)/k, and the mean of theta^2/2 is the share. */
-static void guess(double share, double u[3])
-{
-    double mean = 0;
-    for (int i = 0; i < 1000; i++) {
-        const double a = EULER * (i + 0.5) / 1000, theta = sin(a) / EULER - (1 - cos(a)) / (EULER * EULER);
-        mean += theta * theta / 1000;
-    }
-    const double f = sqrt(2 * share / mean);
-    u[0] = u[2] = f;
-    u[1] = EULER * EULER;
-}
-
 /* f/N: the share grows in steps from a small one, for which the initial guess is good. */
 static double slip_friction(double share)
 {
@@ -162,7 +148,16 @@ static double slip_friction(double share)
     double u[3]; /* theta'(0), N, f */
     gsl_vector_view start = gsl_vector_view_array(u, 3);
     int status = solver ? GSL_SUCCESS : GSL_ENOMEM;
-    guess(share / STEPS, u);
+    /* The initial guess is the mode in which a clamped and pinned column buckles, of that size: theta is
+     * -f (1 - cos k s)/k^2 + f sin(k s)/k, and the mean of theta^2/2 is the share. */
+    double mean = 0;
+    for (int i = 0; i < 1000; i++) {
+        const double a = EULER * (i + 0.5) / 1000, theta = sin(a) / EULER - (1 - cos(a)) / (EULER * EULER);
+        mean += theta * theta / 1000;
+    }
+    const double f = sqrt(2 * (share / STEPS) / mean);
+    u[0] = u[2] = f;
+    u[1] = EULER * EULER;
     for (int k = 1; k <= STEPS && !status; k++) {
         double pushed = share * k / STEPS;
         gsl_multiroot_function function = {miss, 3, &pushed};

@@ -84,16 +84,6 @@ static int chain_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
                       .tolerance = 1e-10, .others = "'controller': {'type': 'fixed'}");
 }
 
-/* The amplitude of a mode: other modes are orthogonal to it in the mass matrix. */
-static double amplitude(const drape_reference_run *run, const double *mode)
-{
-    const double *mass = drape_model_masses(run->model), *x = drape_sim_positions(run->sim);
-    double sum = 0;
-    for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
-        sum += mass[i] * mode[3 * i + 2] * x[3 * i + 2];
-    return sum;
-}
-
 static drape_status measure_frequency(drape_reference_run *run, double *value)
 {
     const size_t n = 3 * (size_t)drape_model_node_count(run->model);
@@ -107,7 +97,11 @@ static drape_status measure_frequency(drape_reference_run *run, double *value)
     for (int k = 1; !status && found < 4 && k < 4 * STEPS; k++) {
         const double before = now;
         status = drape_sim_advance(run->sim, k * dt);
-        now = amplitude(run, v);
+        /* The amplitude of a mode: other modes are orthogonal to it in the mass matrix. */
+        const double *mass = drape_model_masses(run->model), *x = drape_sim_positions(run->sim);
+        now = 0;
+        for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
+            now += mass[i] * v[3 * i + 2] * x[3 * i + 2];
         if (before * now < 0) {
             crossing = (k - 1 + before / (before - now)) * dt;
             found++;

@@ -46,25 +46,20 @@ static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
                       .poisson_ratio = 1.0 / 3, .terms = "'stretch.edge', 'bend.hinge'", .pins = EDGES(""));
 }
 
-/* Twice the square root of the area per node: a dozen nodes or so lie within that distance. */
-static double neighbourhood(const double *rest, size_t nodes)
-{
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (size_t i = 0; i < nodes; i++)
-        for (size_t k = 0; k < 2; k++) {
-            low[k] = fmin(low[k], rest[3 * i + 2 * k]);
-            high[k] = fmax(high[k], rest[3 * i + 2 * k]);
-        }
-    return 2 * sqrt((high[0] - low[0]) * (high[1] - low[1]) / (double)nodes);
-}
-
 /* The deflection along -y at (x, z) at rest: of the least-squares quadratic through the nodes around. */
 static double deflection(const drape_reference_run *run, double x, double z)
 {
     enum { MAX_NODES = 64, TERMS = 6 };
     const double *rest = drape_model_rest_positions(run->model), *at = drape_sim_positions(run->sim);
     const size_t nodes = (size_t)drape_model_node_count(run->model);
-    const double near = neighbourhood(rest, nodes);
+    /* Twice the square root of the area per node: a dozen nodes or so lie within that distance. */
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (size_t i = 0; i < nodes; i++)
+        for (size_t k = 0; k < 2; k++) {
+            low[k] = fmin(low[k], rest[3 * i + 2 * k]);
+            high[k] = fmax(high[k], rest[3 * i + 2 * k]);
+        }
+    const double near = 2 * sqrt((high[0] - low[0]) * (high[1] - low[1]) / (double)nodes);
     size_t found[MAX_NODES], count = 0;
     for (size_t i = 0; i < nodes && count < MAX_NODES; i++)
         if (hypot(rest[3 * i] - x, rest[3 * i + 2] - z) < near)

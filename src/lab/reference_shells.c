@@ -91,30 +91,23 @@ typedef struct roof_path {
     double load;       /* [N]; NAN: not found */
 } roof_path;
 
-/* The coefficients of p = c0 + c1 (w - w1) + c2 (w - w1)^2 through the three points. */
-static void roof_parabola(const roof_path *path, double c[3])
-{
-    const double *w = path->w, *p = path->p;
-    const double before = (p[1] - p[0]) / (w[1] - w[0]), after = (p[2] - p[1]) / (w[2] - w[1]);
-    c[0] = p[1];
-    c[2] = (after - before) / (w[2] - w[0]);
-    c[1] = before + c[2] * (w[1] - w[0]);
-}
-
 static drape_status roof_point(void *user, drape_sim *sim, const drape_path_point *point)
 {
     roof_path *path = user;
-    double c[3];
-    memmove(path->w, path->w + 1, 2 * sizeof path->w[0]);
-    memmove(path->p, path->p + 1, 2 * sizeof path->p[0]);
-    path->w[2] = 1e3 * (path->rest[0] - drape_sim_positions(sim)[0]);
-    path->p[2] = ROOF_LOAD * point->factor;
+    double *w = path->w, *p = path->p;
+    memmove(w, w + 1, 2 * sizeof *w);
+    memmove(p, p + 1, 2 * sizeof *p);
+    w[2] = 1e3 * (path->rest[0] - drape_sim_positions(sim)[0]);
+    p[2] = ROOF_LOAD * point->factor;
     if (point->number < 2 || isfinite(path->load))
         return DRAPE_OK;
-    roof_parabola(path, c);
-    if (path->w[2] > path->target) {
-        const double w = path->target - path->w[1];
-        path->load = c[0] + w * (c[1] + w * c[2]);
+    /* The coefficients of p = c0 + c1 (w - w1) + c2 (w - w1)^2 through the three points. */
+    const double before = (p[1] - p[0]) / (w[1] - w[0]), after = (p[2] - p[1]) / (w[2] - w[1]);
+    const double curved = (after - before) / (w[2] - w[0]);
+    const double c[] = {p[1], before + curved * (w[1] - w[0]), curved};
+    if (w[2] > path->target) {
+        const double ahead = path->target - w[1];
+        path->load = c[0] + ahead * (c[1] + ahead * c[2]);
         return DRAPE_RETRY_REJECTED; /* the path may end */
     }
     if (point->event == DRAPE_PATH_LIMIT)

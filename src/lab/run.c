@@ -183,21 +183,6 @@ static drape_status watch(void *user, const drape_event *event)
     return r->over_budget || r->late || r->cancelled ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* Advances to each of the times, where steps then end, and compares and records the states there. */
-static drape_status advance_to_times(drape_sim *sim, run *r)
-{
-    const lab_request *request = r->request;
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < request->time_count; i++) {
-        status = drape_sim_advance(sim, request->times[i]);
-        if (!status && request->reference && (int64_t)i < request->reference->frames)
-            compare(r, drape_sim_positions(sim), (int64_t)i);
-        if (!status && request->record)
-            lab_trace_add(request->record, drape_sim_positions(sim));
-    }
-    return status;
-}
-
 static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
 {
     drape_stability s = {0};
@@ -212,8 +197,16 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     }
     r->start = drape_clock_thread_seconds();
     const double wall = drape_clock_seconds();
-    r->status =
-        r->request->times ? advance_to_times(sim, r) : drape_sim_advance(sim, drape_model_duration(r->model));
+    const lab_request *request = r->request;
+    if (!request->times)
+        r->status = drape_sim_advance(sim, drape_model_duration(r->model));
+    for (size_t i = 0; request->times && !r->status && i < request->time_count; i++) {
+        r->status = drape_sim_advance(sim, request->times[i]); /* a step ends there */
+        if (!r->status && request->reference && (int64_t)i < request->reference->frames)
+            compare(r, drape_sim_positions(sim), (int64_t)i);
+        if (!r->status && request->record)
+            lab_trace_add(request->record, drape_sim_positions(sim));
+    }
     if (r->status == DRAPE_E_STOPPED && drape_sim_stopped_by(sim) >= 0)
         r->status = DRAPE_OK; /* as the scene says */
     r->cpu = drape_clock_thread_seconds() - r->start;
@@ -221,44 +214,13 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     snprintf(r->message, sizeof r->message, "%s", r->status ? drape_context_message(ctx) : "");
     if (r->over_budget)
         snprintf(r->message, sizeof r->message, "t=%.9g: its budget of %.4g s of CPU time was used up",
-                 drape_sim_time(sim), r->request->seconds);
-    if (r->request->record && !r->request->times)
-        lab_trace_add(r->request->record, drape_sim_positions(sim));
+                 drape_sim_time(sim), request->seconds);
+    if (request->record && !request->times)
+        lab_trace_add(request->record, drape_sim_positions(sim));
     return r->cancelled ? drape_fail(ctx, DRAPE_E_STOPPED, "interrupted") : DRAPE_OK;
 }
 
-/* Positions of the points that the request probes; NULL: it probes none. */
-static json_t *probed_positions(const run *r, const double *x)
-{
-    const lab_request *request = r->request;
-    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
-    for (size_t i = 0; positions && i < request->probe->count; i++) {
-        double point[3];
-        lab_probe_take(request->probe, i, r->model, x, point);
-        for (int k = 0; k < 3; k++)
-            json_array_append_new(positions, drape_json_number(point[k]));
-    }
-    return positions;
-}
-
 /* ---- The result ---- */
-
-/* Errors relative to the size of the scene, of a run that reached its last time. */
-static void put_relative_errors(const run *r, const double *x, json_t *result)
-{
-    const double size = r->model->length;
-    const bool whole = !r->status;
-    json_object_set_new(result, "size_m", json_real(size));
-    json_object_set_new(
-        result, "error_end",
-        drape_json_number(whole ? lab_distance(r->model, x, lab_trace_end(r->request->reference)) / size
-                                : NAN));
-    json_object_set_new(result, "error_max", drape_json_number(whole ? r->far / size : NAN));
-    json_object_set_new(
-        result, "mescd",
-        drape_json_number(whole ? lab_correct_digits(r->model, x, lab_trace_end(r->request->reference))
-                                : NAN));
-}
 
 static json_t *describe(const run *r, drape_sim *sim)
 {
@@ -314,9 +276,23 @@ static json_t *describe(const run *r, drape_sim *sim)
     json_object_set_new(result, "reasons", reasons);
     if (compares)
         json_object_set_new(result, "reference_error_m", drape_json_number(request->reference_error));
-    if (compares && request->times)
-        put_relative_errors(r, x, result);
-    json_t *positions = probed_positions(r, x);
+    if (compares && request->times) {
+        /* Errors relative to the size of the scene, of a run that reached its last time. */
+        const double size = r->model->length, *end = lab_trace_end(request->reference);
+        const double error_end = r->status ? NAN : lab_distance(r->model, x, end) / size,
+                     digits = r->status ? NAN : lab_correct_digits(r->model, x, end);
+        json_object_set_new(result, "size_m", json_real(size));
+        json_object_set_new(result, "error_end", drape_json_number(error_end));
+        json_object_set_new(result, "error_max", drape_json_number(r->status ? NAN : r->far / size));
+        json_object_set_new(result, "mescd", drape_json_number(digits));
+    }
+    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
+    for (size_t i = 0; positions && i < request->probe->count; i++) {
+        double point[3];
+        lab_probe_take(request->probe, i, r->model, x, point);
+        for (int k = 0; k < 3; k++)
+            json_array_append_new(positions, drape_json_number(point[k]));
+    }
     if (positions)
         json_object_set_new(result, "positions", positions);
     return result;

@@ -29,13 +29,6 @@ static drape_status unpacked(const place *at, int code, const json_error_t *faul
     return code ? refuse(at, "", fault->text) : DRAPE_OK;
 }
 
-static bool is_one_of(const char *key, const char *const *keys)
-{
-    while (*keys && strcmp(*keys, key) != 0)
-        keys++;
-    return *keys != NULL;
-}
-
 /* The members of an object, scalars but for some. Texts are shown, or become part of the name of a file. */
 static drape_status check_members(const place *at, const json_t *object, const char *const *nested)
 {
@@ -43,8 +36,10 @@ static drape_status check_members(const place *at, const json_t *object, const c
     json_t *value;
     json_object_foreach((json_t *)(uintptr_t)object, key, value)
     {
-        if ((json_is_object(value) || json_is_array(value) || json_is_boolean(value)) &&
-            !is_one_of(key, nested))
+        size_t i = 0;
+        while (nested[i] && strcmp(nested[i], key) != 0)
+            i++;
+        if ((json_is_object(value) || json_is_array(value) || json_is_boolean(value)) && !nested[i])
             return refuse(at, key, "must be a text, a number or null");
         char copy[LONGEST] = "";
         const char *text = json_is_string(value) ? json_string_value(value) : "";

@@ -33,21 +33,6 @@ static void put_others(char *text, const char *members)
         put(text, ", %s", members);
 }
 
-/* Writes the value in place of each @. */
-static void put_value(char *text, double value)
-{
-    char before[DRAPE_LAB_TEXT];
-    snprintf(before, sizeof before, "%s", text);
-    *text = 0;
-    for (const char *at = before; *at; at += *at == '@') {
-        const size_t length = strcspn(at, "@");
-        put(text, "%.*s", (int)length, at);
-        at += length;
-        if (*at)
-            put(text, "%.17g", value);
-    }
-}
-
 int lab_sheet_text(const lab_sheet *sheet, double value, char text[DRAPE_LAB_TEXT])
 {
     lab_sheet varied = *sheet;
@@ -85,7 +70,16 @@ int lab_sheet_text(const lab_sheet *sheet, double value, char text[DRAPE_LAB_TEX
     put(text, "}");
     put_others(text, s->others);
     put(text, ", 'duration': %.17g}", s->duration > 0 ? s->duration : 1);
-    put_value(text, value);
+    char before[DRAPE_LAB_TEXT];
+    snprintf(before, sizeof before, "%s", text);
+    *text = 0; /* then with the value in place of each @ */
+    for (const char *at = before; *at; at += *at == '@') {
+        const size_t length = strcspn(at, "@");
+        put(text, "%.*s", (int)length, at);
+        at += length;
+        if (*at)
+            put(text, "%.17g", value);
+    }
     return (int)strlen(text);
 }
 
@@ -204,19 +198,6 @@ drape_status lab_unstable_modes(drape_reference_run *run, double *value)
     return status;
 }
 
-/* The share of a mode in the motion of the whole scene along axis k: (sum m u_k)^2/(sum m u^2 sum m). A mode
- * that twists a strip, or bends it in its plane, has none. */
-static double moves_along(const drape_reference_run *run, const drape_mode *mode, size_t k)
-{
-    const double *mass = drape_model_masses(run->model);
-    double sum = 0, all = 0;
-    for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++) {
-        sum += mass[i] * mode->shape[3 * i + k];
-        all += mass[i];
-    }
-    return sum * sum / (mode->mass * all);
-}
-
 drape_status lab_omega(drape_reference_run *run, double *value)
 {
     const double *constants = run->reference->constants;
@@ -229,11 +210,20 @@ drape_status lab_omega(drape_reference_run *run, double *value)
     if (!status)
         status = drape_sim_modes(run->sim, &def, &modes);
     *value = NAN;
-    for (int32_t i = 0; i < modes.count && number > 0; i++)
-        if (!constants[0] || moves_along(run, &modes.modes[i], (size_t)constants[0] - 1) > 1e-3) {
-            number--;
-            *value = number == 0 ? constants[2] * sqrt(modes.modes[i].value) : NAN;
+    for (const drape_mode *mode = modes.modes; mode < modes.modes + modes.count && number > 0; mode++) {
+        /* Its share in the motion of the whole scene along axis k: (sum m u_k)^2/(sum m u^2 sum m). A mode that
+         * twists a strip, or bends it in its plane, has none. */
+        const double *mass = drape_model_masses(run->model);
+        double sum = 0, all = 0;
+        for (size_t i = 0; constants[0] && i < (size_t)drape_model_node_count(run->model); i++) {
+            sum += mass[i] * mode->shape[3 * i + (size_t)constants[0] - 1];
+            all += mass[i];
         }
+        if (constants[0] && !(sum * sum / (mode->mass * all) > 1e-3))
+            continue;
+        number--;
+        *value = number == 0 ? constants[2] * sqrt(mode->value) : NAN;
+    }
     drape_modes_free(&modes);
     return status;
 }

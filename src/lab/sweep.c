@@ -122,11 +122,6 @@ static drape_status put_in_order(sweep *s)
     return DRAPE_OK;
 }
 
-static bool is_late(const sweep *s)
-{
-    return s->deadline > 0 && drape_clock_seconds() > s->deadline;
-}
-
 /* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
  * thread failed. */
 static size_t take_case(sweep *s)
@@ -135,7 +130,10 @@ static size_t take_case(sweep *s)
     pthread_mutex_lock(&s->lock);
     while (s->next < s->count && (!lab_is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
         s->next++;
-    const size_t mine = s->status || s->next >= s->count || is_late(s) ? l->count : s->order[s->next++];
+    const size_t mine =
+        s->status || s->next >= s->count || (s->deadline > 0 && drape_clock_seconds() > s->deadline)
+            ? l->count
+            : s->order[s->next++];
     pthread_mutex_unlock(&s->lock);
     return mine;
 }

@@ -60,16 +60,6 @@ static drape_status check_potential(const lab_tangent *t, const drape_point *poi
                : DRAPE_OK;
 }
 
-/* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are left
- * out. What else is not symmetric, as drag.wind in its own wind, is no part of K. */
-static void make_symmetric(const lab_tangent *t, const drape_point *point)
-{
-    if (drape_system_is_symmetric(t->system))
-        lab_tangent_is_symmetric(t, t->values);
-    else
-        drape_system_symmetrize(t->system, point, 0, t->values);
-}
-
 static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_potential)
 {
     const drape_model *m = t->sim->model;
@@ -95,7 +85,12 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_po
     lab_tangent_evaluate(t, now->x, t->factor, force, NULL, NULL);
     for (int64_t i = 0; i < t->pattern->n; i++)
         t->force = fmax(t->force, fabs(force[i]));
-    make_symmetric(t, &point);
+    /* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are
+     * left out. What else is not symmetric, as drag.wind in its own wind, is no part of K. */
+    if (drape_system_is_symmetric(t->system))
+        lab_tangent_is_symmetric(t, t->values);
+    else
+        drape_system_symmetrize(t->system, &point, 0, t->values);
     return needs_potential ? check_potential(t, &point) : DRAPE_OK;
 }
 
@@ -222,15 +217,6 @@ double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor
     return largest;
 }
 
-/* x = the state's nodes, moved by share u. */
-static void move(const lab_tangent *t, double share, const double *u, double *x)
-{
-    const drape_model *m = t->sim->model;
-    memcpy(x, drape_sim_state(t->sim)->x, 3 * (size_t)m->node_count * sizeof *x);
-    for (int32_t i = 0; i < 3 * m->free_count; i++)
-        x[3 * (size_t)m->node_of_free[i / 3] + (size_t)(i % 3)] += share * u[i];
-}
-
 /* The largest change of an edge along u, in parts of its length: of its length or of its direction. */
 static double largest_change(const lab_tangent *t, const double *u)
 {
@@ -266,7 +252,10 @@ drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *va
     const double h = DIFFERENCE / change;
     for (int side = -1; side <= 1; side += 2) {
         bool changed;
-        move(t, side * h, u, x);
+        const drape_model *m = t->sim->model;
+        memcpy(x, drape_sim_state(t->sim)->x, 3 * (size_t)m->node_count * sizeof *x);
+        for (int32_t i = 0; i < 3 * m->free_count; i++)
+            x[3 * (size_t)m->node_of_free[i / 3] + (size_t)(i % 3)] += side * h * u[i];
         const drape_point point = point_at(t, x);
         drape_status status = drape_system_extend_pattern(t->system, &point, &changed);
         if (status)

@@ -59,23 +59,6 @@ static drape_status measure_at(drape_reference_run *run, double load, double *va
     return status;
 }
 
-/* Bisects between a load at which the measure is 0 and one at which it is not. */
-static drape_status search(drape_reference_run *run, double expected, double *load)
-{
-    double low = run->reference->low * expected, high = run->reference->high * expected, value = 0;
-    drape_status status = DRAPE_OK;
-    for (int k = 0; !status && k < BISECTIONS; k++) {
-        *load = (low + high) / 2;
-        status = measure_at(run, *load, &value);
-        if (value > 0)
-            high = *load;
-        else
-            low = *load;
-    }
-    *load = (low + high) / 2;
-    return status;
-}
-
 int drape_validate_runs(const drape_reference *reference)
 {
     return reference->high > 0 ? BISECTIONS : 1;
@@ -103,12 +86,20 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
                                .parameter = reference->parameters[index],
                                .cancel = cancel,
                                .user = user};
-    drape_status status;
+    drape_status status = DRAPE_OK;
     *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
     drape_validate_judge(reference, out);
-    if (reference->high > 0)
-        status = search(&run, reference->documented ? out->documented : out->expected, &out->obtained);
-    else
+    if (reference->high > 0) {
+        /* Bisects between a load at which the measure is 0 and one at which it is not. */
+        const double about = reference->documented ? out->documented : out->expected;
+        double low = reference->low * about, high = reference->high * about, value = 0;
+        for (int k = 0; !status && k < BISECTIONS; k++) {
+            out->obtained = (low + high) / 2;
+            status = measure_at(&run, out->obtained, &value);
+            *(value > 0 ? &high : &low) = out->obtained;
+        }
+        out->obtained = (low + high) / 2;
+    } else
         status = measure_at(&run, 0, &out->obtained);
     out->seconds = drape_clock_cpu_seconds() - start;
     if (status && cancel && cancel(user))
