@@ -4,10 +4,7 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "base/param.h"
-#include "lab/plan.h"
-#include "lab/run.h"
-#include "lab/schema.h"
-#include "lab/sweep.h"
+#include "lab/lab.h"
 #include "lab/text.h"
 
 #include <errno.h>

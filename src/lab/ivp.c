@@ -4,7 +4,6 @@
  * does. Errors are relative to the size of the scene, and taken at times at which steps end.
  */
 #include "lab/ivp.h"
-#include "lab/figure.h"
 #include "lab/series.h"
 #include "lab/statistics.h"
 #include "lab/text.h"

@@ -12,9 +12,11 @@
 #ifndef DRAPE_LAB_IVP_H
 #define DRAPE_LAB_IVP_H
 
+#include "drape/lab.h"
 #include "integrators/integrator.h"
-#include "lab/run.h"
+#include "lab/trace.h"
 
+#include <jansson.h>
 #include <stdio.h>
 
 /* A scene of the set, or one that may become one. Its memory is in the arena that it was opened with. */

@@ -24,10 +24,32 @@
 #include "lab/trace.h"
 
 #include <jansson.h>
+#include <stdatomic.h>
 #include <stdio.h>
 
 typedef struct lab lab;
-struct lab_request;
+
+/* A case to simulate, and the measurements to make. */
+typedef struct lab_request {
+    const drape_lab_def *def;   /* scene, settings of all cases, cancel */
+    const char *scene;          /* name of its file; NULL: the def's */
+    const char *identity;       /* that the scene must have when the case is done (lab_identify) */
+    const json_t *identified;   /* settings with which it has that identity; NULL: none */
+    const json_t *settings;     /* {pointer: value} of the case; NULL: none */
+    const lab_trace *reference; /* NULL or no frames: nothing to compare with */
+    double reference_error;     /* [m] estimate of its error */
+    const double *times;        /* (time_count) [s] at which steps end, and at which it is compared and
+                                   recorded; NULL: at frames, which may lie within steps, and at the end */
+    size_t time_count;
+    const lab_probe *probe; /* NULL or no points: nowhere */
+    lab_trace *record;      /* its frames and, last, its end; or its states at `times`. NULL: not
+                                   recorded. Made here, in: */
+    drape_arena *arena;     /* of the record */
+    double seconds;         /* CPU: a run that takes more is stopped */
+    double deadline;        /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
+    int repeats;            /* the least CPU time of so many counts */
+    const atomic_bool *given_up; /* another thread failed; NULL: there is none */
+} lab_request;
 
 typedef struct lab_experiment_ops {
     drape_entry entry;
@@ -43,7 +65,7 @@ typedef struct lab_experiment_ops {
     drape_status (*verify)(lab *l);
     /* Completes the request of a case: its scene and what it is compared with, if these are not those of
      * the def and of all cases. NULL: they are. */
-    void (*request)(const lab *l, size_t index, struct lab_request *request);
+    void (*request)(const lab *l, size_t index, lab_request *request);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
     /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have
@@ -109,5 +131,97 @@ bool lab_has_param(const drape_entry *entry, const char *name);
 /* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its
  * parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
+
+/* ---- run.c: a case, the scene with its settings, simulated and measured ---- */
+
+/* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile;
+ * *scene is to be destroyed in any case. */
+drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
+drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
+
+/* The identity of a scene and of all files that it names, as digits: a hash of its text and of these
+ * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
+
+/* The same of the scene of a request as it is now, with the settings `identified`, which are those of one
+ * case for all: a scene may lack what the cases set. Errors: those of loading. */
+drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17]);
+
+/* Whether the scene still has the identity of the request. Errors: those of loading, DRAPE_E_ARGUMENT (it has
+ * another one). */
+drape_status lab_check_identity(drape_context *ctx, const lab_request *request);
+
+/* Whether it compiles. */
+drape_status lab_try(drape_context *ctx, const lab_request *request);
+
+/* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
+ * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED
+ * (cancelled). */
+drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
+
+/* ---- sweep.c: the cases, run by several threads into a file of lines ----
+ *
+ * A case that has a line is not run again; a line that a kill cut short is dropped, and its case is run again. */
+
+/* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay.
+ * *found counts the new ones. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a whole line that is not a result of
+ * this experiment), DRAPE_E_MEMORY. */
+drape_status lab_read_lines(lab *l, const char *folder, int64_t *found);
+
+/* Adds an object as a line. */
+void lab_put_line(drape_file *file, const json_t *object);
+
+/* The name of the file of lines that this process writes. */
+void lab_cases_name(const lab *l, char name[64]);
+
+/* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller
+ * destroys it in any case. */
+drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file);
+
+/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
+ * with. */
+lab_request lab_request_of(const lab *l, size_t index);
+
+/* Runs the cases of this shard that have no result; each becomes a line as soon as it is done. Errors: those
+ * of lab_run, DRAPE_E_FILE, DRAPE_E_STOPPED. */
+drape_status lab_sweep(lab *l);
+
+/* ---- plan.c: what a sweep will take, from a sample of its cases: CPU time, time on free cores, memory, disk ---- */
+
+/* The cases of this shard that are run for a plan of def->plan cases, spread evenly over all of them, in the
+ * order in which they are to be run: at most def->plan, and the same ones in every call. cases: room for
+ * l->count. Returns their number. */
+size_t lab_plan_sample(const lab *l, size_t *cases);
+
+/* Writes plan.json, and its sentences into the summary. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_write_plan(lab *l);
+
+/* Whether a case is run by this shard: it is its own, and not the same as another one. */
+bool lab_is_ours(const lab *l, size_t i);
+
+/* ---- schema.c: experiment.json and cases.jsonl of a stranger, checked once, before anything of them is used ---- */
+
+/* Checks the content of experiment.json; file: its path, for the message. From then on its members have
+ * the types of lab.h, tags and names no control characters, same_as is an earlier case that has a result
+ * of its own, and the cases of a series stand side by side. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+drape_status lab_check_about(drape_context *ctx, const char *file, json_t *about);
+
+/* The same for a line of cases.jsonl beside the cases of the experiment; fault: why line is NULL. */
+drape_status lab_check_line(const lab *l, const char *file, int64_t number, json_t *line,
+                            const json_error_t *fault);
+
+/* ---- reference.c: the reference solution of a work-precision diagram ----
+ *
+ * The motion of the most accurate run that the time allows, with its distance from the next less accurate one as
+ * the estimate of its error. */
+
+/* Makes l->reference and l->reference_error, or reads them if the folder has them (reference.json,
+ * reference.f64). There are two sequences of refinements: ida over rtol at order 5, and trbdf2 over dt; the
+ * one with the smaller distance between its last two levels is taken. Errors: those of lab_run;
+ * DRAPE_E_SOLVER if neither has two levels that complete. */
+drape_status lab_make_reference(lab *l);
+
+/* Whether the scene compiles for every sequence, before anything is written. Errors: those of loading. */
+drape_status lab_check_reference(lab *l);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "base/hash.h"
 #include "io/export.h"
-#include "lab/sweep.h"
+#include "lab/lab.h"
 #include "lab/text.h"
 
 #include <string.h>

@@ -1,8 +1,7 @@
-/* reference.c: see reference.h. */
-#include "lab/reference.h"
+/* reference.c: see lab.h. */
+#include "lab/lab.h"
 
 #include "base/clock.h"
-#include "lab/run.h"
 #include "lab/text.h"
 #include "model/model.h"
 

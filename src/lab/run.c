@@ -1,10 +1,9 @@
-/* run.c: see run.h. */
-#include "lab/run.h"
+/* run.c: see lab.h. */
+#include "lab/lab.h"
 
 #include "base/clock.h"
 #include "base/hash.h"
 #include "io/scene_copy.h"
-#include "lab/lab.h"
 #include "model/model.h"
 #include "sim/identity.h"
 #include "sim/sim.h"

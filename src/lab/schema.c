@@ -1,5 +1,5 @@
-/* schema.c: see schema.h; the form of both files is in lab.h. */
-#include "lab/schema.h"
+/* schema.c: see lab.h, which has the form of both files. */
+#include "lab/lab.h"
 
 #include <string.h>
 

@@ -7,8 +7,7 @@
  */
 #include "base/retired.h"
 #include "lab/figure.h"
-#include "lab/quantity.h"
-#include "lab/sweep.h"
+#include "lab/lab.h"
 #include "lab/text.h"
 #include "sim/warnings.h"
 
@@ -18,6 +17,43 @@
 #define MAX_AXES 3
 #define LONGEST  1024
 #define MAX_RUNS 1000000
+
+/* ---- What figures show ---- */
+
+/* A result of a case that is a number: a column of results.csv that a map or a curve can show. */
+typedef struct lab_quantity {
+    drape_entry entry; /* name and meaning */
+    const char *unit;  /* "": none */
+} lab_quantity;
+
+#define QUANTITY(id, unit_text, text)                                                                        \
+    &((const lab_quantity){.entry = {.name = id, .summary = text}, .unit = unit_text}).entry
+
+static const drape_entry *const entries[] = {
+    QUANTITY("energy_drift", "", "energy that the method gained (negative) or lost / largest kinetic energy"),
+    QUANTITY("energy_numerical_J", "J", "energy that the method gained (negative) or lost"),
+    QUANTITY("strain_max", "", "largest strain of an edge"),
+    QUANTITY("strain_min", "", "smallest strain of an edge"),
+    QUANTITY("accepted", "", "accepted steps"),
+    QUANTITY("rejected", "", "rejected attempts at steps"),
+    QUANTITY("rejected_share", "", "rejected attempts / all attempts"),
+    QUANTITY("unconverged", "", "steps accepted although they had not converged"),
+    QUANTITY("iterations", "", "iterations of Newton's method"),
+    QUANTITY("iterations_per_step", "", "iterations of Newton's method / accepted steps"),
+    QUANTITY("residuals", "", "evaluations of the residual"),
+    QUANTITY("jacobians", "", "Jacobian matrices"),
+    QUANTITY("factorizations", "", "factorisations"),
+    QUANTITY("linear_iterations", "", "iterations of the linear solver"),
+    QUANTITY("cpu_s", "s", "CPU time of the steps"),
+    QUANTITY("wall_s", "s", "wall-clock time of the steps"),
+    QUANTITY("h_min_s", "s", "smallest accepted step"),
+    QUANTITY("h_max_s", "s", "largest accepted step"),
+    QUANTITY("explicit_limit_s", "s", "stability limit of an explicit method at the start"),
+    NULL,
+};
+
+static const drape_registry quantities = {
+    .noun = "result", .key = "results", .title = "Results", .place = "", .entries = entries};
 
 /* ---- Axes ---- */
 
@@ -73,15 +109,19 @@ static void cell_bounds(const axis *a, int k, double *low, double *high)
     *high = axis_value(a, k + 0.5);
 }
 
+static bool is_among(const char *name, const char *const *names)
+{
+    while (*names && strcmp(*names, name) != 0)
+        names++;
+    return *names != NULL;
+}
+
 /* Whether the scene takes an integer there, as the resolution of a mesh. */
 static bool is_integer_axis(const axis *a)
 {
-    static const char *const integers[] = {"/columns",  "/rows",      "/edges",
-                                           "/substeps", "/max_order", "/max_iterations"};
-    for (size_t i = 0; i < sizeof integers / sizeof *integers; i++)
-        if (strcmp(strrchr(a->pointer, '/'), integers[i]) == 0)
-            return true;
-    return false;
+    static const char *const integers[] = {"/columns",   "/rows",           "/edges", "/substeps",
+                                           "/max_order", "/max_iterations", NULL};
+    return is_among(strrchr(a->pointer, '/'), integers);
 }
 
 /* The value that is run and recorded; powers are integers up to rounding. */
@@ -89,20 +129,6 @@ static json_t *setting_value(const axis *a, int k)
 {
     const double value = axis_value(a, k);
     return is_integer_axis(a) ? json_integer((json_int_t)llround(value)) : json_real(value);
-}
-
-/* Refuses an axis of an integer value with fractions: they would be rounded, and the map would show wrong
- * values. */
-static drape_status check_integers(lab *l, const axis *a)
-{
-    for (int k = 0; is_integer_axis(a) && k < a->count; k++) {
-        double value = axis_value(a, k);
-        if (!(fabs(value) < 1e15) || fabs(value - round(value)) > 1e-9 * fmax(1, fabs(value)))
-            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "axis \"%.100s\": its value %d would be %.6g, but must be an integer",
-                              a->pointer, k + 1, value);
-    }
-    return DRAPE_OK;
 }
 
 /* ---- The cases ---- */
@@ -122,40 +148,42 @@ static void indices_of(const space *s, size_t cell, int *indices)
     }
 }
 
-/* Reads axes whose texts have been counted. */
-static drape_status read_axes(lab *l, const char *const *texts, space *s)
+/* The axes are those of l->arguments: a merge has no def. */
+static drape_status read_space(lab *l, space *s)
 {
+    const json_t *axes = json_object_get(l->arguments, "axes");
     drape_status status = DRAPE_OK;
-    s->cells = 1;
+    *s = (space){.count = (int)json_array_size(axes), .cells = 1};
+    if (s->count < 1 || s->count > MAX_AXES)
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
     for (int a = 0; !status && a < s->count; a++) {
-        status = read_axis(l, texts[a], &s->axes[a]);
+        status = read_axis(l, json_string_value(json_array_get(axes, (size_t)a)), &s->axes[a]);
         s->cells *= (size_t)s->axes[a].count;
     }
     return status;
 }
 
-static drape_status read_space(lab *l, space *s)
+/* What the axes of a def must be besides: an axis of an integer value with fractions would be rounded, and the map
+ * would show wrong values. */
+static drape_status check_space(lab *l, const space *s)
 {
-    const drape_lab_def *def = l->def;
-    if (def->axis_count < 1 || def->axis_count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                          "a map has 1 to 3 axes, such as \"/integrator/dt=1e-3:1e-1:9log\"; %zu are given",
-                          def->axis_count);
-    *s = (space){.count = (int)def->axis_count};
-    drape_status status = read_axes(l, def->axes, s);
-    for (int a = 0; !status && a < s->count; a++)
-        status = check_integers(l, &s->axes[a]);
-    if (status)
-        return status;
-    if (s->cells > MAX_RUNS)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has at most %d points; the axes have %zu",
-                          MAX_RUNS, s->cells);
-    for (int a = 0; a < s->count; a++)
-        for (int b = 0; b < a; b++)
-            if (strcmp(s->axes[a].pointer, s->axes[b].pointer) == 0)
-                return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "axis \"%.100s\" is given twice",
-                                  s->axes[a].pointer);
-    return DRAPE_OK;
+    for (int i = 0; i < s->count; i++) {
+        const axis *a = &s->axes[i];
+        for (int k = 0; is_integer_axis(a) && k < a->count; k++) {
+            const double value = axis_value(a, k);
+            if (!(fabs(value) < 1e15) || fabs(value - round(value)) > 1e-9 * fmax(1, fabs(value)))
+                return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                                  "axis \"%.100s\": its value %d would be %.6g, but must be an integer",
+                                  a->pointer, k + 1, value);
+        }
+        for (int k = 0; k < i; k++)
+            if (strcmp(a->pointer, s->axes[k].pointer) == 0)
+                return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "axis \"%.100s\" is given twice", a->pointer);
+    }
+    return s->cells <= MAX_RUNS
+               ? DRAPE_OK
+               : drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has at most %d points; the axes have %zu",
+                            MAX_RUNS, s->cells);
 }
 
 /* Whether the command line, or an axis, sets the value at the pointer. */
@@ -219,47 +247,35 @@ static drape_status try_ends(lab *l, size_t first, const space *s)
     return status;
 }
 
-static bool is_default(const char *integrator)
-{
-    static const char *const names[] = {"be", "bdf2", "ida", "verlet"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        if (strcmp(names[i], integrator) == 0)
-            return true;
-    return false;
-}
-
-/* The results that the figures show. */
-static drape_status plan_results(lab *l, const space *s)
-{
-    json_t *results = json_array();
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < l->def->result_count; i++) {
-        int k;
-        status = drape_registry_choose(l->ctx, &lab_quantity_registry, "", l->def->results[i], &k);
-        json_array_append_new(results, json_string(l->def->results[i]));
-    }
-    if (l->def->result_count == 0 && s->count == 1)
-        json_array_append_new(results, json_string("energy_drift"));
-    json_object_set_new(l->about, "results", results);
-    return status;
-}
-
 static drape_status plan(lab *l)
 {
+    static const char *const defaults[] = {"be", "bdf2", "ida", "verlet", NULL};
+    const drape_lab_def *def = l->def;
     space s;
-    drape_status status = read_space(l, &s);
-    if (status)
-        return status;
-    json_t *axes = json_array();
-    for (int a = 0; a < s.count; a++)
-        json_array_append_new(axes, json_string(l->def->axes[a]));
+    if (def->axis_count < 1 || def->axis_count > MAX_AXES)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                          "a map has 1 to 3 axes, such as \"/integrator/dt=1e-3:1e-1:9log\"; %zu are given",
+                          def->axis_count);
+    json_t *axes = json_array(), *results = json_array();
+    for (size_t a = 0; a < def->axis_count; a++)
+        json_array_append_new(axes, drape_json_text(def->axes[a]));
     json_object_set_new(l->arguments, "axes", axes);
-    json_object_set_new(l->arguments, "strain_limit", json_real(l->def->strain_limit));
-    status = plan_results(l, &s);
+    json_object_set_new(l->arguments, "strain_limit", json_real(def->strain_limit));
+    json_object_set_new(l->about, "results", results);
+    drape_status status = read_space(l, &s);
+    if (!status)
+        status = check_space(l, &s);
+    for (size_t i = 0; !status && i < def->result_count; i++) {
+        int k;
+        status = drape_registry_choose(l->ctx, &quantities, "", def->results[i], &k);
+        json_array_append_new(results, json_string(def->results[i]));
+    }
+    if (!status && def->result_count == 0 && s.count == 1)
+        json_array_append_new(results, json_string("energy_drift"));
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *integrator = drape_integrators[i];
         const size_t first = json_array_size(l->cases);
-        if (!lab_wants_integrator(l, integrator->entry.name, is_default(integrator->entry.name)))
+        if (!lab_wants_integrator(l, integrator->entry.name, is_among(integrator->entry.name, defaults)))
             continue;
         for (size_t cell = 0; cell < s.cells && !status; cell++)
             status = add_cell(l, &s, integrator, cell, first);
@@ -375,13 +391,6 @@ static shade make_shade(const lab *l, const lab_quantity *quantity)
     return sh;
 }
 
-/* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low end. */
-static double shade_of(const shade *sh, double value)
-{
-    const double share = value == 0 && sh->axis.log ? 0 : lab_axis_share(&sh->axis, value);
-    return (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * share))) + 0.5) / LAB_SHADES;
-}
-
 /* ---- Maps ---- */
 
 /* A figure: the cells of an integrator, at an index on the third axis, or all integrators over a single
@@ -418,7 +427,10 @@ static look look_at(const map *m, lab_fill kind, size_t i)
     const verdict v = judge(m->l, m->l->results[i]);
     const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
     const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
-    const double share = shaded ? shade_of(&m->shade, value) : 1;
+    /* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low end. */
+    const double at = value == 0 && m->shade.axis.log ? 0 : lab_axis_share(&m->shade.axis, value);
+    const double share =
+        shaded ? (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * at))) + 0.5) / LAB_SHADES : 1;
     switch (kind) {
     case LAB_COLOURED:
         return (look){!shaded, shows ? LAB_GREY : verdicts[v].colour};
@@ -438,14 +450,12 @@ static void write_row(map *m, lab_fill kind, int row)
     const axis *x = &m->s->axes[0];
     double left, right, from = 0, bottom, top;
     const size_t first = row_of(m, row, &bottom, &top);
-    look before = {0};
-    for (int i = 0; i < x->count; i++) {
-        const look here = look_at(m, kind, first + (size_t)i);
-        const look next = i + 1 < x->count ? look_at(m, kind, first + (size_t)i + 1) : (look){.there = false};
+    look before = {0}, here = look_at(m, kind, first), next = {0};
+    for (int i = 0; i < x->count; i++, before = here, here = next) {
+        next = i + 1 < x->count ? look_at(m, kind, first + (size_t)i + 1) : (look){.there = false};
         cell_bounds(x, i, &left, &right);
         if (!(before.there && before.fill == here.fill))
             from = left;
-        before = here;
         if (here.there && !(next.there && next.fill == here.fill))
             lab_figure_box(&m->f, from, right, bottom, top, here.fill);
     }
@@ -602,21 +612,6 @@ static drape_status draw_rows(lab *l, map *m)
 #define FAILED_ROOM 2.4 /* [mm] above the curves, for the runs of an integrator that have no results */
 #define CURVE_ROOM  46.0
 
-/* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. */
-static void set_curve_axis(map *m, int failed)
-{
-    lab_axis *y = &m->f.axes[1];
-    *y = m->shade.axis;
-    if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
-        static const char *const none[] = {""};
-        y->to = y->from + 1;
-        y->names = none;
-        y->name_count = 1;
-    }
-    m->f.plot_height = CURVE_ROOM + FAILED_ROOM * failed;
-    lab_axis_widen(y, 0.04, 0.04 + FAILED_ROOM * failed / CURVE_ROOM);
-}
-
 /* The kinds of marks on a curve. */
 typedef enum mark { ON_CURVE, FEW_STEPS, NO_RESULT, OVER_BUDGET, MARKS } mark;
 
@@ -657,32 +652,31 @@ static void write_marks(map *m, size_t first, mark kind, double height)
     }
 }
 
-/* The name of the runs without a value that are not over budget. */
-static const char *blank_name(const map *m)
-{
-    bool stopped = false, completed = false;
-    for (size_t i = 0; i < m->l->count; i++)
-        if (mark_of(m, i) == NO_RESULT)
-            *(has_results(judge(m->l, m->l->results[i])) ? &completed : &stopped) = true;
-    return !completed ? "stopped or exploded" : stopped ? "stopped, exploded or no value" : "no value";
-}
-
 /* Values over a single axis, a curve for each integrator. Runs of few steps are open markers off the curve,
  * and those without a result a row of crosses above the curves. */
 static drape_status draw_curves(lab *l, map *m)
 {
     static const int markers[MARKS] = {
         [FEW_STEPS] = LAB_OPEN_MARKER, [NO_RESULT] = LAB_CROSS_MARKER, [OVER_BUDGET] = LAB_PLUS_MARKER};
-    const lab_axis *y = &m->f.axes[1];
+    static const char *const none[] = {""};
+    lab_axis *y = &m->f.axes[1];
     char name[96], text[96];
     int failed = 0, counts[MARKS];
-    bool seen[MARKS] = {false};
+    bool seen[MARKS] = {false}, stopped = false, completed = false; /* runs that have no value */
     snprintf(name, sizeof name, "curve_%s", m->shade.quantity->entry.name);
     lab_figure_begin(l, &m->f, name);
     set_axis(&m->s->axes[0], &m->f.axes[0]);
     for (size_t first = 0; first < l->count; first += m->s->cells)
         failed += count_marks(m, first, counts);
-    set_curve_axis(m, failed);
+    /* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. */
+    *y = m->shade.axis;
+    if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
+        y->to = y->from + 1;
+        y->names = none;
+        y->name_count = 1;
+    }
+    m->f.plot_height = CURVE_ROOM + FAILED_ROOM * failed;
+    lab_axis_widen(y, 0.04, 0.04 + FAILED_ROOM * failed / CURVE_ROOM);
     for (size_t first = 0; first < l->count; first += m->s->cells)
         add_limit_at(m, first, y->from, y->to);
     for (size_t first = 0; first < l->count; first += m->s->cells) {
@@ -704,9 +698,15 @@ static drape_status draw_curves(lab *l, map *m)
                     &m->f, (lab_style){open.colour, 0, kind == FEW_STEPS ? open.point : markers[kind]}, NULL);
         }
     }
+    for (size_t i = 0; i < l->count; i++)
+        if (mark_of(m, i) == NO_RESULT)
+            *(has_results(judge(l, l->results[i])) ? &completed : &stopped) = true;
     verdict_text(l, LATE, text);
-    const char *const names[MARKS] = {
-        [FEW_STEPS] = verdicts[SHORT].name, [NO_RESULT] = blank_name(m), [OVER_BUDGET] = text};
+    const char *const names[MARKS] = {[FEW_STEPS] = verdicts[SHORT].name,
+                                      [NO_RESULT] = !completed ? "stopped or exploded"
+                                                    : stopped  ? "stopped, exploded or no value"
+                                                               : "no value",
+                                      [OVER_BUDGET] = text};
     for (mark kind = FEW_STEPS; kind < MARKS; kind++)
         if (seen[kind])
             lab_figure_marker(&m->f, (lab_style){LAB_BLACK, 0, markers[kind]}, names[kind]);
@@ -715,15 +715,16 @@ static drape_status draw_curves(lab *l, map *m)
 
 /* ---- The report ---- */
 
-/* What happened, or a result that the experiment shows. */
-static drape_status draw(lab *l, const space *s, const shade *sh)
+/* A result that the experiment shows; NULL: what happened. */
+static drape_status draw(lab *l, const space *s, const lab_quantity *quantity)
 {
     drape_status status = DRAPE_OK;
-    map m = {
-        .l = l, .s = s, .shade = *sh, .rows = s->count == 1 ? (int)(l->count / s->cells) : s->axes[1].count};
+    map m = {.l = l, .s = s, .rows = s->count == 1 ? (int)(l->count / s->cells) : s->axes[1].count};
     const size_t cells = (size_t)s->axes[0].count * (size_t)m.rows;
+    if (quantity)
+        m.shade = make_shade(l, quantity);
     if (s->count == 1)
-        return sh->quantity ? draw_curves(l, &m) : draw_rows(l, &m);
+        return quantity ? draw_curves(l, &m) : draw_rows(l, &m);
     for (; !status && m.first + cells <= l->count; m.first += cells) {
         m.limits = 0;
         status = draw_map(l, &m, (int)(m.first % s->cells / cells));
@@ -731,42 +732,14 @@ static drape_status draw(lab *l, const space *s, const shade *sh)
     return status;
 }
 
-static void summarise(lab *l, const space *s, size_t first)
-{
-    int64_t count[VERDICTS] = {0};
-    const char *comma = "";
-    for (size_t cell = 0; cell < s->cells; cell++)
-        count[judge(l, l->results[first + cell])]++;
-    fprintf(l->summary, "%s:", lab_tag_text(l->results[first], "integrator"));
-    for (int v = 0; v < VERDICTS; v++)
-        if (count[v]) {
-            fprintf(l->summary, "%s %lld %s", comma, (long long)count[v], verdicts[v].name);
-            comma = ",";
-        }
-    fprintf(l->summary, "\n");
-}
-
-/* The axes are those of experiment.json: a merge has no def. */
-static drape_status read_about(lab *l, space *s)
-{
-    const json_t *axes = json_object_get(l->arguments, "axes");
-    const char *texts[MAX_AXES];
-    *s = (space){.count = (int)json_array_size(axes)};
-    if (s->count < 1 || s->count > MAX_AXES)
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
-    for (int a = 0; a < s->count; a++)
-        texts[a] = json_string_value(json_array_get(axes, (size_t)a));
-    return read_axes(l, texts, s);
-}
-
 /* The result that the figures show, by its number in experiment.json. */
 static drape_status read_result(lab *l, size_t i, const lab_quantity **quantity)
 {
     const json_t *results = json_object_get(l->about, "results");
     int k = 0;
-    drape_status status = drape_registry_choose(l->ctx, &lab_quantity_registry, "",
-                                                json_string_value(json_array_get(results, i)), &k);
-    *quantity = status ? NULL : lab_quantity_at(k);
+    drape_status status =
+        drape_registry_choose(l->ctx, &quantities, "", json_string_value(json_array_get(results, i)), &k);
+    *quantity = status ? NULL : (const lab_quantity *)(const void *)entries[k]; /* its first member */
     return status;
 }
 
@@ -776,7 +749,7 @@ static drape_status verify(lab *l)
 {
     space s;
     const lab_quantity *quantity;
-    drape_status status = read_about(l, &s);
+    drape_status status = read_space(l, &s);
     for (size_t i = 0; !status && i < json_array_size(json_object_get(l->about, "results")); i++)
         status = read_result(l, i, &quantity);
     if (!status && l->count % s.cells != 0)
@@ -804,21 +777,28 @@ static drape_status verify(lab *l)
 static drape_status report(lab *l)
 {
     space s;
-    drape_status status = read_about(l, &s);
-    for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells)
-        summarise(l, &s, first);
-    if (!status) {
-        lab_page_heading(l, "What happened");
-        status = draw(l, &s, &(shade){.quantity = NULL});
+    const lab_quantity *quantity = NULL;
+    drape_status status = read_space(l, &s);
+    for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells) {
+        int64_t count[VERDICTS] = {0};
+        const char *comma = "";
+        for (size_t cell = 0; cell < s.cells; cell++)
+            count[judge(l, l->results[first + cell])]++;
+        fprintf(l->summary, "%s:", lab_tag_text(l->results[first], "integrator"));
+        for (int v = 0; v < VERDICTS; v++)
+            if (count[v]) {
+                fprintf(l->summary, "%s %lld %s", comma, (long long)count[v], verdicts[v].name);
+                comma = ",";
+            }
+        fprintf(l->summary, "\n");
     }
-    for (size_t i = 0; !status && i < json_array_size(json_object_get(l->about, "results")); i++) {
-        const lab_quantity *quantity;
-        status = read_result(l, i, &quantity);
-        if (!status) {
-            const shade sh = make_shade(l, quantity);
-            lab_page_heading(l, quantity->entry.name);
-            status = draw(l, &s, &sh);
-        }
+    for (size_t i = 0; !status && i <= json_array_size(json_object_get(l->about, "results")); i++) {
+        if (i > 0)
+            status = read_result(l, i - 1, &quantity);
+        if (status)
+            break;
+        lab_page_heading(l, quantity ? quantity->entry.name : "What happened");
+        status = draw(l, &s, quantity);
     }
     return status;
 }

@@ -1,11 +1,9 @@
-/* sweep.c: see sweep.h. */
-#include "lab/sweep.h"
+/* sweep.c: see lab.h. */
+#include "lab/lab.h"
 
 #include "base/clock.h"
 #include "base/json_read.h"
 #include "io/export.h"
-#include "lab/plan.h"
-#include "lab/schema.h"
 
 #include <dirent.h>
 #include <errno.h>

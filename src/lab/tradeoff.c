@@ -4,7 +4,7 @@
  * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
  */
 #include "lab/figure.h"
-#include "lab/reference.h"
+#include "lab/lab.h"
 #include "lab/series.h"
 #include "lab/text.h"
 #include "solvers/linear.h"
