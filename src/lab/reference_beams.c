@@ -29,19 +29,18 @@ static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
                       .tolerance = c->parameter * 1e-13); /* at most a thousandth of the weight of a node */
 }
 
-static drape_status measure_slope(drape_reference_run *run, double *value)
+static double slope_of(const drape_reference_run *run)
 {
     double tip[3];
-    drape_status status = lab_tip(run, tip);
-    *value = -tip[1] / tip[0];
-    return status;
+    lab_tip(run, tip);
+    return -tip[1] / tip[0];
 }
 
 DRAPE_REFERENCE(
     cantilever, .entry.summary = "drop of the end over its reach", .unit = "1",
     .parameter = "G = rho g L^3/B", DRAPE_CASES(0.01, 0.1, 1, 10, 100, 1000), BEAM,
     .entry.reference = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
-    .tolerance = 0.01, .expected = slope, .scene = heavy_scene, .measure = measure_slope);
+    .tolerance = 0.01, .expected = slope, .scene = heavy_scene, .value = slope_of);
 
 /* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the
  * bending length as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487
@@ -49,7 +48,7 @@ DRAPE_REFERENCE(
 DRAPE_REFERENCE(bending_length, .entry.summary = "angle of the chord to the end", .unit = "degree",
                 .parameter = "G = rho g L^3/B", DRAPE_CASES(8), BEAM,
                 .entry.reference = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
-                .tolerance = 0.005, .expected = drape_rod_chord, .measure = lab_chord,
+                .tolerance = 0.005, .expected = drape_rod_chord, .value = lab_chord,
                 SHEET(NARROW(0.004), .tolerance = 1e-12, VARIED(gravity[1], -STRIP_GRAVITY(1))));
 
 /* ---- A force at the end that stays vertical ---- */
@@ -66,7 +65,7 @@ DRAPE_REFERENCE(
     DRAPE_CASES(1, 2, 4), .model = "stretch.cst, bend.midedge, load.line; irregular",
     .entry.reference =
         "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
-    .tolerance = 0.005, .expected = sinking, .measure = lab_sinking,
+    .tolerance = 0.005, .expected = sinking, .value = lab_sinking,
     SHEET(NARROW(0.004), .tolerance = 1e-12, .factor = -STRIP_RIGIDITY,
           .terms = "'stretch.cst', 'bend.midedge', "
                    "{'type': 'load.line', 'edge': 'right', 'force': [0, @, 0]}"));
@@ -83,7 +82,7 @@ DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1",
                             4.7123889803846899), /* to three quarters of a circle */
                 .model = "stretch.cst, bend.midedge, load.moment; irregular",
                 .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
-                .measure = lab_rise,
+                .value = lab_rise,
                 SHEET(NARROW(0.01), .tolerance = 1e-11, .factor = STRIP_RIGIDITY,
                       .terms = "'stretch.cst', 'bend.midedge', "
                                "{'type': 'load.moment', 'edge': 'right', 'moment': @}"));
@@ -95,18 +94,16 @@ static double rolled_energy(double angle)
     return angle * angle / 2;
 }
 
-static drape_status measure_rolled(drape_reference_run *run, double *value)
+static double energy_of_roll(const drape_reference_run *run)
 {
-    const drape_status status = lab_advance(run);
-    *value = drape_sim_energy(run->sim).elastic / (STRIP_RIGIDITY * 0.05);
-    return status;
+    return drape_sim_energy(run->sim).elastic / (STRIP_RIGIDITY * 0.05);
 }
 
 DRAPE_REFERENCE(
     rolled_strip, .entry.summary = "energy of a strip between clamps that turn, E L/(B w)", .unit = "1",
     .parameter = "angle [rad]", DRAPE_CASES(0.5, 1, 2, 3.1415926535897932),
     .model = "stretch.cst, bend.midedge; irregular", .entry.reference = "an arc: angle^2/2",
-    .tolerance = 0.001, .expected = rolled_energy, .measure = measure_rolled,
+    .tolerance = 0.001, .expected = rolled_energy, .value = energy_of_roll,
     SHEET(FREE_STRIP(0.01), .columns = 41, .rows = 4, .height = 0.05, .tolerance = 1e-10,
           .factor = 90 / 3.1415926535897932,
           .pins = "{'edge': 'left', 'clamp': true, 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, "
@@ -116,7 +113,7 @@ DRAPE_REFERENCE(
 
 DRAPE_REFERENCE(rest_curvature, .entry.summary = "rise of the end w/L", .unit = "1",
                 .parameter = "curvature L", DRAPE_CASES(1, 3.14159265358979323846), BEAM,
-                .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .measure = lab_rise,
+                .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .value = lab_rise,
                 /* It starts flat. */
                 SHEET(NARROW(0.02), .tolerance = 1e-12, .factor = 1,
                       .terms = "'stretch.cst', {'type': 'bend.midedge', 'curvature': [@, 0, 0]}"));

@@ -28,7 +28,7 @@ static int fall_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 DRAPE_REFERENCE(free_fall, .entry.summary = "distance fallen in 0.5 s", .unit = "m", .parameter = "steps",
                 DRAPE_CASES(10, 100), .model = "stretch.cst, bend.midedge; irregular; be",
                 .entry.reference = "sum of backward Euler's steps", .tolerance = 1e-9, .expected = fallen,
-                .scene = fall_scene, .measure = lab_sinking);
+                .scene = fall_scene, .value = lab_sinking);
 
 /* ---- An oscillator ----
  *

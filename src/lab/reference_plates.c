@@ -82,14 +82,12 @@ static double deflection(const drape_reference_run *run, double x, double z)
     return failed ? NAN : fit[0];
 }
 
-static drape_status measure(drape_reference_run *run, double *value)
+static double middle(const drape_reference_run *run)
 {
-    drape_status status = lab_advance(run);
-    *value = deflection(run, 0.5, -0.5) / PRESSURE;
-    return status;
+    return deflection(run, 0.5, -0.5) / PRESSURE;
 }
 
-#define PLATE .entry.summary = "w D/(q a^4) in the middle", .unit = "1", .measure = measure
+#define PLATE .entry.summary = "w D/(q a^4) in the middle", .unit = "1", .value = middle
 
 DRAPE_REFERENCE(plate_supported, PLATE, .parameter = "nu", DRAPE_CASES(0.3, 0),
                 .model = "stretch.cst, bend.midedge; irregular",

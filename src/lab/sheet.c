@@ -90,9 +90,8 @@ drape_status lab_advance(drape_reference_run *run)
     return drape_sim_advance(run->sim, drape_model_duration(run->model));
 }
 
-drape_status lab_tip(drape_reference_run *run, double tip[3])
+void lab_tip(const drape_reference_run *run, double tip[3])
 {
-    drape_status status = lab_advance(run);
     const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);
     const size_t nodes = (size_t)drape_model_node_count(run->model);
     double farthest = -INFINITY;
@@ -108,30 +107,25 @@ drape_status lab_tip(drape_reference_run *run, double tip[3])
         }
     for (int k = 0; k < 3; k++)
         tip[k] /= count;
-    return status;
 }
 
-drape_status lab_rise(drape_reference_run *run, double *value)
+double lab_rise(const drape_reference_run *run)
 {
     double tip[3];
-    drape_status status = lab_tip(run, tip);
-    *value = tip[1];
-    return status;
+    lab_tip(run, tip);
+    return tip[1];
 }
 
-drape_status lab_sinking(drape_reference_run *run, double *value)
+double lab_sinking(const drape_reference_run *run)
 {
-    drape_status status = lab_rise(run, value);
-    *value = -*value;
-    return status;
+    return -lab_rise(run);
 }
 
-drape_status lab_chord(drape_reference_run *run, double *value)
+double lab_chord(const drape_reference_run *run)
 {
     double tip[3];
-    drape_status status = lab_tip(run, tip);
-    *value = atan2(-tip[1], tip[0]) * (180 / 3.14159265358979323846);
-    return status;
+    lab_tip(run, tip);
+    return atan2(-tip[1], tip[0]) * (180 / 3.14159265358979323846);
 }
 
 double lab_mean(const drape_reference_run *run, const double *values, size_t k)
@@ -143,16 +137,14 @@ double lab_mean(const drape_reference_run *run, const double *values, size_t k)
     return sum / (double)nodes;
 }
 
-drape_status lab_displacement(drape_reference_run *run, double *value)
+double lab_displacement(const drape_reference_run *run)
 {
-    const drape_status status = lab_advance(run);
     const double *pair = run->reference->constants;
     for (int i = 0; run->reference->parameters[i] != run->parameter; i++)
         pair += 2;
     const size_t at = 3 * (size_t)pair[0] + (size_t)fabs(pair[1]) - 1;
     const double moved = drape_sim_positions(run->sim)[at] - drape_model_rest_positions(run->model)[at];
-    *value = pair[1] < 0 ? -moved : moved;
-    return status;
+    return pair[1] < 0 ? -moved : moved;
 }
 
 drape_status lab_pull(drape_reference_run *run, size_t k, double at, double force[3])

@@ -55,19 +55,19 @@ const char *lab_sheet_format(char text[400], const char *format, ...) __attribut
 /* Advances to the end of the scene. */
 drape_status lab_advance(drape_reference_run *run);
 
-/* The same, and the mean position of the nodes that had the largest x at rest; its y; its -y; its angle
- * [degree] below the x axis. */
-drape_status lab_tip(drape_reference_run *run, double tip[3]);
-drape_status lab_rise(drape_reference_run *run, double *value);
-drape_status lab_sinking(drape_reference_run *run, double *value);
-drape_status lab_chord(drape_reference_run *run, double *value);
+/* The mean position of the nodes that had the largest x at rest; its y; its -y; its angle [degree] below the x
+ * axis. */
+void lab_tip(const drape_reference_run *run, double tip[3]);
+double lab_rise(const drape_reference_run *run);
+double lab_sinking(const drape_reference_run *run);
+double lab_chord(const drape_reference_run *run);
 
 /* The mean over all nodes of component k of positions or velocities (node_count x 3). */
 double lab_mean(const drape_reference_run *run, const double *values, size_t k);
 
-/* Advances, and measures the displacement of a node along an axis. The constants are pairs, one of each case:
+/* The displacement of a node along an axis. The constants are pairs, one of each case:
  * the node, and the axis as 1, 2 or 3, below 0 for the displacement against it. */
-drape_status lab_displacement(drape_reference_run *run, double *value);
+double lab_displacement(const drape_reference_run *run);
 
 /* The sum of the forces of the pins [N] on the nodes whose component k was `at` at rest. */
 drape_status lab_pull(drape_reference_run *run, size_t k, double at, double force[3]);
