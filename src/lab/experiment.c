@@ -104,23 +104,6 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
     return l->def->integrator_count == 0 && fallback;
 }
 
-/* Faults of the def: an integrator that does not exist, or that has no steps in time. */
-static drape_status check_integrators(const lab *l)
-{
-    for (size_t i = 0; i < l->def->integrator_count; i++) {
-        const char *name = l->def->integrators[i];
-        int k;
-        drape_status status = drape_registry_choose(l->ctx, &drape_integrator_registry, "", name, &k);
-        if (status)
-            return status;
-        if (drape_integrators[k]->steady_state)
-            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "\"%s\" has no steps in time: %s needs integrators that have them", name,
-                              l->experiment->entry.name);
-    }
-    return DRAPE_OK;
-}
-
 /* ---- Planning ---- */
 
 static drape_status plan(lab *l)
@@ -137,7 +120,16 @@ static drape_status plan(lab *l)
     l->arguments = json_object_get(l->about, "arguments");
     if (!l->cases || !l->arguments)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
-    drape_status status = check_integrators(l);
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < l->def->integrator_count; i++) {
+        const char *name = l->def->integrators[i];
+        int k;
+        status = drape_registry_choose(l->ctx, &drape_integrator_registry, "", name, &k);
+        if (!status && drape_integrators[k]->steady_state)
+            status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                                "\"%s\" has no steps in time: %s needs integrators that have them", name,
+                                l->experiment->entry.name);
+    }
     if (!status)
         status = l->experiment->plan(l);
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
@@ -226,11 +218,6 @@ static bool is_same(const json_t *a, const json_t *b)
     return same;
 }
 
-static drape_status write_about(lab *l)
-{
-    return lab_write_json(l, ABOUT, json_incref(l->about), JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-}
-
 static bool ends_in(const char *name, const char *ending)
 {
     const size_t length = strlen(name), end = strlen(ending);
@@ -263,7 +250,9 @@ static drape_status claim_folder(lab *l)
     if (status)
         return status;
     snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
-    if (access(path, F_OK) == 0) {
+    l->claimed = access(path, F_OK) != 0;
+    bool changed = l->claimed;
+    if (!l->claimed) {
         json_t *there = NULL;
         status = parse_about(l, l->folder, &there);
         if (!status && !is_same(there, l->about))
@@ -271,16 +260,15 @@ static drape_status claim_folder(lab *l)
                                 "\"%.400s\" holds another experiment, or this one of another scene or "
                                 "version; name another folder, or remove it",
                                 l->folder);
-        const bool changed = !status && !json_equal(there, l->about);
+        changed = !status && !json_equal(there, l->about);
         json_decref(there);
         l->input_is_good = !status;
-        if (!status)
-            status = drape_folder_begin(l->out, NULL, NULL);
-        return status || !changed ? status : write_about(l);
     }
-    l->claimed = true;
-    status = drape_folder_begin(l->out, NULL, NULL);
-    return status ? status : write_about(l);
+    if (!status)
+        status = drape_folder_begin(l->out, NULL, NULL);
+    return status || !changed
+               ? status
+               : lab_write_json(l, ABOUT, json_incref(l->about), JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
 static bool is_about(const void *user, const char *name)

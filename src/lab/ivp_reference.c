@@ -179,9 +179,8 @@ static drape_status store(const lab_ivp *s, const attempt *attempts, int count, 
     if (!data || !path)
         return DRAPE_E_MEMORY;
     drape_npy_put_header(best->best.frames, drape_model_node_count(s->model), header);
-    snprintf(digits, sizeof digits, "%016llx",
-             (unsigned long long)drape_hash_bytes(drape_hash_bytes(DRAPE_HASH_START, header, sizeof header),
-                                                  best->best.x, size));
+    const uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, header, sizeof header);
+    lab_digits(drape_hash_bytes(hash, best->best.x, size), digits);
     json_t *about = lab_ivp_provenance(s);
     about = drape_json_with(about, "times_s", drape_json_numbers(s->times, s->time_count));
     about = drape_json_with(about, "error", json_real(error));

@@ -236,8 +236,7 @@ static drape_status read_positions(lab_ivp *s, const char *path, const json_t *a
     drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
     if (status)
         return status;
-    snprintf(digits, sizeof digits, "%016llx",
-             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, bytes, size));
+    lab_digits(drape_hash_bytes(DRAPE_HASH_START, bytes, size), digits);
     if (strcmp(digits, lab_text(about, "data_hash")) != 0)
         return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
                           "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",

@@ -139,6 +139,9 @@ bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
+/* A hash as digits. */
+void lab_digits(uint64_t hash, char digits[17]);
+
 /* The identity of a scene and of all files that it names, as digits: a hash of its text and of these
  * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);

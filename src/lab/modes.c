@@ -16,6 +16,7 @@
  * of eigenvalues below a value is that of the negative pivots of K - value M, or K + (value - f0) K'. What is
  * missing is searched for among vectors orthogonal to what was found.
  */
+#include "base/def.h"
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "drape/lab.h"
@@ -102,12 +103,6 @@ static drape_status apply(void *user, const double *x, double *y)
 
 /* ---- Factors ---- */
 
-/* The number of negative pivots of a matrix; *known: as drape_inertia has it. */
-static drape_status count_negative(const problem *p, const double *values, int64_t *negative, bool *known)
-{
-    return drape_inertia(p->ctx, p->tangent.pattern, values, NULL, negative, known);
-}
-
 /* Factors the shifted matrix if it is positive definite. */
 static drape_status factor(problem *p, bool *definite)
 {
@@ -130,26 +125,11 @@ static drape_status factor_below_all(problem *p)
                : drape_fail(p->ctx, DRAPE_E_SOLVER, "no shift is below all eigenvalues of the stiffness");
 }
 
-/* Why a state has no buckling loads. */
-static drape_status refuse_unstable(const problem *p)
-{
-    int64_t negative;
-    bool known;
-    drape_status status = count_negative(p, p->shifted, &negative, &known);
-    if (status)
-        return status;
-    return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
-                      known ? "the state has %lld unstable modes: it has buckled already; buckling loads are "
-                              "those of a stable state, such as the start without loads"
-                            : "the stiffness of the state is singular: buckling loads need a cloth that is "
-                              "held and has a stiffness against every motion (%lld negative pivots)",
-                      (long long)negative);
-}
-
 static drape_status prepare_buckling(problem *p)
 {
     const size_t n = (size_t)p->n;
-    bool definite = false;
+    int64_t negative;
+    bool definite = false, known;
     double *load = drape_arena_take(&p->arena, n, sizeof *load);
     double *u = drape_arena_take(&p->arena, n, sizeof *u);
     p->slope = drape_arena_take(&p->arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->slope);
@@ -159,9 +139,17 @@ static drape_status prepare_buckling(problem *p)
     lab_tangent_shift(&p->tangent, 0, NULL, p->shifted);
     drape_status status = factor(p, &definite);
     if (!status && !definite)
-        status = refuse_unstable(p);
+        status = drape_inertia(p->ctx, p->tangent.pattern, p->shifted, NULL, &negative, &known);
     if (status)
         return status;
+    if (!definite)
+        return drape_fail(
+            p->ctx, DRAPE_E_ARGUMENT,
+            known ? "the state has %lld unstable modes: it has buckled already; buckling loads are "
+                    "those of a stable state, such as the start without loads"
+                  : "the stiffness of the state is singular: buckling loads need a cloth that is "
+                    "held and has a stiffness against every motion (%lld negative pivots)",
+            (long long)negative);
     lab_tangent_evaluate(&p->tangent, drape_sim_state(p->tangent.sim)->x, p->shift, NULL, load, NULL);
     if (p->solver->solve(p->factors, load, u))
         return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness cannot be solved with");
@@ -171,21 +159,6 @@ static drape_status prepare_buckling(problem *p)
 }
 
 /* ---- Search ---- */
-
-static drape_status grow(problem *p, int32_t wanted)
-{
-    const size_t n = (size_t)p->n, room = (size_t)(p->count + wanted);
-    if (p->count + wanted <= p->room)
-        return DRAPE_OK;
-    double *vector = drape_arena_resize(&p->arena, p->vector, room * n, sizeof *vector);
-    p->vector = vector ? vector : p->vector;
-    double *product = drape_arena_resize(&p->arena, p->product, room * n, sizeof *product);
-    p->product = product ? product : p->product;
-    eigenpair *pairs = drape_arena_resize(&p->arena, p->pairs, room, sizeof *pairs);
-    p->pairs = pairs ? pairs : p->pairs;
-    p->room = vector && product && pairs ? (int32_t)room : p->room;
-    return p->room == (int32_t)room ? DRAPE_OK : DRAPE_E_MEMORY;
-}
 
 /* Searches for more pairs, and puts them among the others. Buckling: those with op <= 0 are loads in the
  * other direction. */
@@ -197,10 +170,17 @@ static drape_status search(problem *p, int32_t wanted)
         wanted = (int32_t)(p->n - 1 - p->count);
     if (wanted < 1)
         return DRAPE_OK;
-    drape_status status = grow(p, wanted);
-    double *value = status ? NULL : drape_arena_take(&p->arena, (size_t)wanted, sizeof *value);
-    if (!value)
-        return DRAPE_E_MEMORY;
+    const size_t n = (size_t)p->n, room = (size_t)(p->count + wanted);
+    if (p->room < (int32_t)room) {
+        p->vector = drape_arena_resize(&p->arena, p->vector, room * n, sizeof *p->vector);
+        p->product = drape_arena_resize(&p->arena, p->product, room * n, sizeof *p->product);
+        p->pairs = drape_arena_resize(&p->arena, p->pairs, room, sizeof *p->pairs);
+        p->room = (int32_t)room;
+    }
+    double *value = drape_arena_take(&p->arena, (size_t)wanted, sizeof *value);
+    drape_status status = drape_arena_status(&p->arena);
+    if (status)
+        return status;
     const lab_known known = {p->count, p->vector, p->product};
     status = lab_eigen(p->ctx, &op, &known, wanted, &found, value, p->vector + (int64_t)p->count * p->n);
     for (int32_t k = 0; !status && k < found; k++) {
@@ -249,7 +229,7 @@ static drape_status find_missing(const problem *p, int32_t wanted, int64_t *miss
         lab_tangent_shift(&p->tangent, distance, p->slope, p->shifted);
     else
         lab_tangent_shift(&p->tangent, -(p->shift + distance), NULL, p->shifted);
-    drape_status status = count_negative(p, p->shifted, &negative, &known);
+    drape_status status = drape_inertia(p->ctx, p->tangent.pattern, p->shifted, NULL, &negative, &known);
     /* The operator's own again. */
     lab_tangent_shift(&p->tangent, p->buckling ? 0 : -p->shift, NULL, p->shifted);
     if (status || !known)
@@ -483,8 +463,7 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
 void drape_modes_def_init(drape_modes_def *def, size_t struct_size)
 {
     const drape_modes_def defaults = {.struct_size = struct_size, .count = 6, .load_factor = 1};
-    if (def)
-        memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 drape_status drape_sim_modes(drape_sim *sim, const drape_modes_def *given, drape_modes *out)

@@ -13,6 +13,7 @@
  * that nothing depends on the size of the loads. At a limit point K is singular, but the step has a direction
  * there: b dominates, and df = s |b|^-1.
  */
+#include "base/def.h"
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "drape/lab.h"
@@ -108,15 +109,6 @@ static drape_status factor(follower *p)
     return status ? status : p->solver->solve(p->factors, p->a, p->b);
 }
 
-/* The change of the factor in a correction a + df b. */
-static double correct_factor(const follower *p, control by)
-{
-    const double *normal = by == CONTROL_BRANCH ? p->mode : p->step;
-    if (by == CONTROL_LOAD)
-        return 0;
-    return -dot(p, normal, p->a) / dot(p, normal, p->b);
-}
-
 /* Corrects the step so far until its end is an equilibrium. limit [m]: of a correction. DRAPE_RETRY_* if that
  * fails. */
 static drape_status correct(follower *p, control by, double limit, drape_path_point *point)
@@ -142,7 +134,8 @@ static drape_status correct(follower *p, control by, double limit, drape_path_po
         status = p->solver->solve(p->factors, p->force, p->a);
         if (status)
             return status;
-        const double change = correct_factor(p, by);
+        const double *normal = by == CONTROL_BRANCH ? p->mode : p->step;
+        const double change = by == CONTROL_LOAD ? 0 : -dot(p, normal, p->a) / dot(p, normal, p->b);
         for (size_t i = 0; i < p->n; i++)
             p->a[i] += change * p->b[i];
         if (!(norm(p, p->a) <= limit) || !isfinite(change))
@@ -373,28 +366,20 @@ static drape_status begin(follower *p, bool *ended)
     return status ? status : accept(p, point, ended);
 }
 
-static drape_status first_length(follower *p, double *length)
-{
-    drape_status status = open_step(p);
-    *length = p->def->step;
-    if (status > 0)
-        return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness at the first point is singular");
-    if (status || p->def->load_control)
-        return status;
-    *length = p->def->step * norm(p, p->b);
-    return *length > 0 && isfinite(*length)
-               ? DRAPE_OK
-               : drape_fail(p->ctx, DRAPE_E_ARGUMENT,
-                            "no load deforms the cloth: a path needs loads, such as gravity");
-}
-
 static drape_status follow(follower *p)
 {
     bool ended = false, switched = p->def->branch == 0;
-    double length = 0;
     drape_status status = begin(p, &ended);
     if (!status && !ended)
-        status = first_length(p, &length);
+        status = open_step(p);
+    if (status > 0)
+        return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness at the first point is singular");
+    if (status || ended)
+        return status;
+    double length = p->def->step * (p->def->load_control ? 1 : norm(p, p->b));
+    if (!(length > 0 && isfinite(length)))
+        return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
+                          "no load deforms the cloth: a path needs loads, such as gravity");
     const double first = length;
     const double longest = p->def->load_control  ? INFINITY
                            : p->def->max_arc > 0 ? p->def->max_arc
@@ -482,8 +467,7 @@ void drape_path_def_init(drape_path_def *def, size_t struct_size)
 {
     const drape_path_def defaults = {
         .struct_size = struct_size, .to = 1, .step = 0.05, .max_points = 1000, .tolerance = 1e-8};
-    if (def)
-        memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)

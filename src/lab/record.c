@@ -30,8 +30,7 @@ static void hash_of(const lab_record *record, char digits[17])
     char text[DRAPE_LAB_TEXT];
     const drape_reference *r = record->reference;
     drape_reference_text(&(drape_reference_case){r, r->parameters[record->index], 1}, text);
-    snprintf(digits, 17, "%016llx",
-             (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)));
+    lab_digits(drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)), digits);
 }
 
 json_t *lab_record_json(const lab_record *record)

@@ -44,15 +44,6 @@ typedef struct level {
     char failure[200]; /* the message of a run that failed */
 } level;
 
-/* The limit that the next level, which is expected to take GROWTH times the last one, would exceed. */
-static limit next_limit(const lab *l, const level *last, double deadline)
-{
-    const double next = GROWTH * last->took;
-    if (!(next < BUDGET * l->def->case_seconds - last->spent))
-        return CASE_SECONDS;
-    return deadline > 0 && !(drape_clock_seconds() + next < deadline) ? BUDGET_SECONDS : NOTHING;
-}
-
 static json_t *settings_of(const sequence *s, double knob)
 {
     json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", s->method, s->knob, knob);
@@ -185,23 +176,6 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
     return save(l, s, false, last);
 }
 
-/* Refines a sequence as far as is useful. */
-static drape_status refine_all(lab *l, const drape_model *model, int i, level *last)
-{
-    /* [s] of the wall clock by which sequence i has to be done; 0: the experiment has no budget. */
-    const double budget = l->def->budget_seconds;
-    const double deadline = budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
-    drape_status status = DRAPE_OK;
-    *last = (level){.error = INFINITY};
-    read_saved(l, model, &sequences[i], last);
-    while (!status && !last->ended_by && last->count < MAX_LEVELS && last->error > BEST * model->length) {
-        last->ended_by = next_limit(l, last, deadline);
-        if (!last->ended_by)
-            status = refine(l, model, &sequences[i], deadline, last);
-    }
-    return status;
-}
-
 /* Sets the message that there is no reference: what ended each sequence, and what helps. */
 static drape_status fail_without(lab *l, const level last[SEQUENCES])
 {
@@ -243,9 +217,23 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
     drape_status status = DRAPE_OK;
     *best = (level){.error = INFINITY};
     for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
-        status = refine_all(l, model, i, &last[i]);
-        if (!status && last[i].error < best->error) {
-            *best = last[i];
+        level *now = &last[i];
+        /* [s] of the wall clock by which it has to be done; 0: the experiment has no budget. */
+        const double budget = l->def->budget_seconds;
+        const double deadline = budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
+        *now = (level){.error = INFINITY};
+        read_saved(l, model, &sequences[i], now);
+        while (!status && !now->ended_by && now->count < MAX_LEVELS && now->error > BEST * model->length) {
+            const double next = GROWTH * now->took; /* expected */
+            if (!(next < BUDGET * l->def->case_seconds - now->spent))
+                now->ended_by = CASE_SECONDS;
+            else if (deadline > 0 && !(drape_clock_seconds() + next < deadline))
+                now->ended_by = BUDGET_SECONDS;
+            else
+                status = refine(l, model, &sequences[i], deadline, now);
+        }
+        if (!status && now->error < best->error) {
+            *best = *now;
             chosen = &sequences[i];
         }
     }

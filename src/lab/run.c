@@ -94,7 +94,7 @@ static drape_status hash_text(drape_context *ctx, const char *path, uint64_t *ha
     return status;
 }
 
-static void put_digits(uint64_t hash, char digits[17])
+void lab_digits(uint64_t hash, char digits[17])
 {
     snprintf(digits, 17, "%016" PRIx64, hash);
 }
@@ -106,7 +106,7 @@ drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_mo
     if (!status)
         status = drape_scene_files(ctx, model, path, add_file, &f);
     const uint64_t compiled = f.count ? drape_model_identity(model) : 0;
-    put_digits(drape_hash_bytes(f.hash, &compiled, f.count ? sizeof compiled : 0), digits);
+    lab_digits(drape_hash_bytes(f.hash, &compiled, f.count ? sizeof compiled : 0), digits);
     return status;
 }
 
@@ -131,7 +131,7 @@ drape_status lab_check_identity(drape_context *ctx, const lab_request *request)
     uint64_t hash;
     char now[17];
     drape_status status = hash_text(ctx, path_of(request), &hash);
-    put_digits(hash, now); /* the identity of a scene without files: there is nothing to compile */
+    lab_digits(hash, now); /* the identity of a scene without files: there is nothing to compile */
     if (!status && strcmp(now, request->identity) != 0)
         status = lab_identify(ctx, request, now);
     if (!status && strcmp(now, request->identity) != 0)

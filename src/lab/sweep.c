@@ -30,21 +30,6 @@ static drape_status take_line(lab *l, const char *path, int64_t number, const ch
     return DRAPE_OK;
 }
 
-/* A last line without its end was cut short. */
-static drape_status read_file(lab *l, const char *path, int64_t *found)
-{
-    char *text;
-    size_t size;
-    int64_t n = 1;
-    drape_status status = drape_file_read(l->ctx, path, DRAPE_MAX_TABLE, &text, &size);
-    for (char *line = text, *end; !status && (end = strchr(line, '\n')); line = end + 1) {
-        *end = 0;
-        status = take_line(l, path, n++, line, found);
-    }
-    drape_free(l->ctx, text);
-    return status;
-}
-
 drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
 {
     DIR *entries = opendir(folder);
@@ -52,13 +37,21 @@ drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
         return drape_file_fail(l->ctx, "read", folder, errno);
     drape_status status = DRAPE_OK;
     for (struct dirent *e = readdir(entries); e && !status; e = readdir(entries)) {
-        char path[4096];
-        const size_t length = strlen(e->d_name), ending = strlen(".jsonl");
-        if (strncmp(e->d_name, "cases", 5) != 0 || length < ending ||
-            strcmp(e->d_name + length - ending, ".jsonl") != 0)
+        char path[4096], *text;
+        size_t size = strlen(e->d_name);
+        int64_t n = 1;
+        const size_t ending = strlen(".jsonl");
+        if (strncmp(e->d_name, "cases", 5) != 0 || size < ending ||
+            strcmp(e->d_name + size - ending, ".jsonl") != 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
-        status = read_file(l, path, found);
+        status = drape_file_read(l->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+        /* A last line without its end was cut short. */
+        for (char *line = text, *end; !status && (end = strchr(line, '\n')); line = end + 1) {
+            *end = 0;
+            status = take_line(l, path, n++, line, found);
+        }
+        drape_free(l->ctx, text);
     }
     closedir(entries);
     return status;
@@ -103,21 +96,6 @@ static void stop(sweep *s, drape_status status)
     if (!s->status)
         s->status = status;
     atomic_store(&s->given_up, true);
-}
-
-static drape_status put_in_order(sweep *s)
-{
-    const lab *l = s->l;
-    size_t done = 0;
-    s->order = drape_arena_take(&s->l->arena, l->count, sizeof *s->order);
-    if (!s->order)
-        return DRAPE_E_MEMORY;
-    s->count = l->def->plan ? lab_plan_sample(l, s->order) : l->count;
-    for (json_int_t rank = 0; !l->def->plan && done < l->count; rank++)
-        for (size_t i = 0; i < l->count; i++)
-            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
-                s->order[done++] = i;
-    return DRAPE_OK;
 }
 
 /* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
@@ -229,9 +207,15 @@ drape_status lab_sweep(lab *l)
     int started = 0;
     sweep s = {.l = l, .start = drape_clock_seconds()};
     s.deadline = l->def->budget_seconds > 0 ? l->start + l->def->budget_seconds : 0;
-    s.status = put_in_order(&s);
-    if (s.status)
-        return s.status;
+    s.order = drape_arena_take(&l->arena, l->count, sizeof *s.order);
+    if (!s.order)
+        return DRAPE_E_MEMORY;
+    if (l->def->plan)
+        s.count = lab_plan_sample(l, s.order);
+    for (json_int_t rank = 0; !l->def->plan && s.count < l->count; rank++)
+        for (size_t i = 0; i < l->count; i++)
+            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
+                s.order[s.count++] = i;
     lab_cases_name(l, name);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);
