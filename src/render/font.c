@@ -138,33 +138,23 @@ static int digit(char c)
     return c >= 'a' ? c - 'a' + 10 : c - '0';
 }
 
-static void add_line(lines *to, const float *a, const float *b)
-{
-    if (to->count == MAX_LINE)
-        return;
-    memcpy(to->at[to->count][0], a, 2 * sizeof *a);
-    memcpy(to->at[to->count++][1], b, 2 * sizeof *b);
-}
-
-/* The point between b and c on the curve through a, b, c, d. */
-static void curve(const float *a, const float *b, const float *c, const float *d, float s, float *out)
-{
-    for (int k = 0; k < 2; k++)
-        out[k] = 0.5f * (2 * b[k] + (c[k] - a[k]) * s + (2 * a[k] - 5 * b[k] + 4 * c[k] - d[k]) * s * s +
-                         (3 * b[k] - a[k] - 3 * c[k] + d[k]) * s * s * s);
-}
-
+/* A stroke; smooth: by the curve through its points. */
 static void add_stroke(lines *to, const float (*p)[2], int count, bool smooth)
 {
     bool closed = count > 2 && memcmp(p[0], p[count - 1], sizeof *p) == 0;
     for (int i = 0; i + 1 < count; i++) {
-        const float *before = i > 0 ? p[i - 1] : closed ? p[count - 2] : p[0];
-        const float *after = i + 2 < count ? p[i + 2] : closed ? p[1] : p[count - 1];
+        const float *a = i > 0 ? p[i - 1] : closed ? p[count - 2] : p[0], *b = p[i], *c = p[i + 1];
+        const float *d = i + 2 < count ? p[i + 2] : closed ? p[1] : p[count - 1];
         float last[2], next[2];
-        memcpy(last, p[i], sizeof last);
-        for (int k = 1; k <= (smooth ? PIECES : 1); k++) {
-            curve(before, p[i], p[i + 1], after, smooth ? (float)k / PIECES : 1, next);
-            add_line(to, last, next);
+        memcpy(last, b, sizeof last);
+        for (int n = 1; n <= (smooth ? PIECES : 1) && to->count < MAX_LINE; n++) {
+            const float s = smooth ? (float)n / PIECES : 1;
+            for (int k = 0; k < 2; k++)
+                next[k] =
+                    0.5f * (2 * b[k] + (c[k] - a[k]) * s + (2 * a[k] - 5 * b[k] + 4 * c[k] - d[k]) * s * s +
+                            (3 * b[k] - a[k] - 3 * c[k] + d[k]) * s * s * s);
+            memcpy(to->at[to->count][0], last, sizeof last);
+            memcpy(to->at[to->count++][1], next, sizeof next);
             memcpy(last, next, sizeof last);
         }
     }
@@ -186,14 +176,6 @@ static void parse_strokes(const char *text, lines *to)
     }
 }
 
-static float distance(const float (*line)[2], float x, float y)
-{
-    float dx = line[1][0] - line[0][0], dy = line[1][1] - line[0][1], length = dx * dx + dy * dy;
-    float s = length > 0 ? ((x - line[0][0]) * dx + (y - line[0][1]) * dy) / length : 0;
-    s = fminf(1, fmaxf(0, s));
-    return hypotf(x - line[0][0] - s * dx, y - line[0][1] - s * dy);
-}
-
 static void draw_glyph(drape_font *font, int index)
 {
     float scale = font->height / CAPITAL, pen = fmaxf(PEN * scale, 0.55f);
@@ -204,8 +186,13 @@ static void draw_glyph(drape_font *font, int index)
             float x = ((float)i + 0.5f - font->origin[0]) / scale,
                   y = (font->origin[1] - (float)j - 0.5f) / scale;
             float nearest = 1e9f;
-            for (int l = 0; l < all.count; l++)
-                nearest = fminf(nearest, distance((const float(*)[2])all.at[l], x, y));
+            for (int l = 0; l < all.count; l++) {
+                const float *a = all.at[l][0], *b = all.at[l][1];
+                float dx = b[0] - a[0], dy = b[1] - a[1], length = dx * dx + dy * dy;
+                float s = length > 0 ? ((x - a[0]) * dx + (y - a[1]) * dy) / length : 0;
+                s = fminf(1, fmaxf(0, s));
+                nearest = fminf(nearest, hypotf(x - a[0] - s * dx, y - a[1] - s * dy));
+            }
             float cover = fminf(1, fmaxf(0, pen - nearest * scale + 0.5f));
             font->alpha[(size_t)j * (size_t)(font->cell_width * DRAPE_FONT_CELLS) +
                         (size_t)(index * font->cell_width + i)] = (uint8_t)lroundf(255 * cover);
@@ -229,25 +216,17 @@ drape_status drape_font_create(drape_arena *arena, float height, drape_font *fon
     return DRAPE_OK;
 }
 
-/* One character of UTF-8; a byte that belongs to no character stands for itself. */
-static unsigned next_code(const char **text)
-{
-    const unsigned char *c = (const unsigned char *)*text;
-    int more = *c >= 0xf0 ? 3 : *c >= 0xe0 ? 2 : *c >= 0xc0 ? 1 : 0;
-    unsigned code = more ? *c & (0x3fu >> more) : *c;
-    int i = 1;
-    for (; i <= more && (c[i] & 0xc0) == 0x80; i++)
-        code = code << 6 | (c[i] & 0x3fu);
-    *text += i;
-    return code;
-}
-
 int drape_font_next(const drape_font *font, const char **text, float *advance)
 {
     if (!**text)
         return -1;
-    unsigned code = next_code(text);
-    int found = 0;
+    /* One character of UTF-8; a byte that belongs to no character stands for itself. */
+    const unsigned char *c = (const unsigned char *)*text;
+    int more = *c >= 0xf0 ? 3 : *c >= 0xe0 ? 2 : *c >= 0xc0 ? 1 : 0, found = 0, length = 1;
+    unsigned code = more ? *c & (0x3fu >> more) : *c;
+    for (; length <= more && (c[length] & 0xc0) == 0x80; length++)
+        code = code << 6 | (c[length] & 0x3fu);
+    *text += length;
     for (size_t i = 1; i < sizeof glyphs / sizeof *glyphs; i++)
         if (glyphs[i].code == code)
             found = (int)i;

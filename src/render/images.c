@@ -117,13 +117,6 @@ static bool in_box(double x, double y, double x0, double y0, double x1, double y
     return x >= x0 && x <= x1 && y >= y0 && y <= y1;
 }
 
-/* The letter F in the unit square: it shows left, right, up and down. */
-static bool in_letter(double x, double y)
-{
-    return in_box(x, y, 0.28, 0.16, 0.42, 0.84) || in_box(x, y, 0.28, 0.70, 0.74, 0.84) ||
-           in_box(x, y, 0.28, 0.44, 0.64, 0.57);
-}
-
 /* Checks with fine lines between them, and the letter in every second light check. */
 static void paint_pattern(double u, double v, uint8_t *to)
 {
@@ -136,7 +129,9 @@ static void paint_pattern(double u, double v, uint8_t *to)
     const uint8_t *colour = (i + j) % 2 ? light : dark;
     if (fmin(fmin(x, 1 - x), fmin(y, 1 - y)) < 0.03)
         colour = line;
-    else if ((i + j) % 2 && i % 2 == 1 && in_letter(x, y))
+    else if ((i + j) % 2 && i % 2 == 1 &&
+             (in_box(x, y, 0.28, 0.16, 0.42, 0.84) || in_box(x, y, 0.28, 0.70, 0.74, 0.84) ||
+              in_box(x, y, 0.28, 0.44, 0.64, 0.57)))
         colour = red;
     memcpy(to, colour, 3);
     to[3] = 255;
@@ -234,26 +229,20 @@ static void from_oklab(const double *lab, double *rgb)
     rgb[2] = -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s;
 }
 
-static bool is_colour(const double *rgb)
-{
-    for (int k = 0; k < 3; k++)
-        if (rgb[k] < 0 || rgb[k] > 1)
-            return false;
-    return true;
-}
-
 /* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is the largest that the screen can
  * show. */
 void drape_ramp(double s, float rgb[3])
 {
-    double hue = (310 - 205 * pow(s, 1.1)) * PI / 180, chroma = 0.15, colour[3];
+    double hue = (310 - 205 * pow(s, 1.1)) * PI / 180, chroma = 0.15, colour[3], low, high;
     double lab[3] = {0.26 + 0.66 * s, 0, 0};
     do {
         lab[1] = chroma * cos(hue);
         lab[2] = chroma * sin(hue);
         from_oklab(lab, colour);
+        low = fmin(fmin(colour[0], colour[1]), colour[2]);
+        high = fmax(fmax(colour[0], colour[1]), colour[2]);
         chroma -= 0.002;
-    } while (!is_colour(colour) && chroma > 0);
+    } while ((low < 0 || high > 1) && chroma > 0);
     for (int k = 0; k < 3; k++)
         rgb[k] = (float)fmin(1, fmax(0, colour[k]));
 }

@@ -20,17 +20,6 @@ static void legend_title(const drape_shading *shading, char *title, size_t size)
     snprintf(title, size, "%s [%s]", shading->field->entry.name, shading->field->shown_unit);
 }
 
-/* Width of the strip at the right for the legend [pixels]. */
-static int strip_of(const drape_overlay *o, const drape_picture *picture)
-{
-    char title[80];
-    if (!picture->shading->field)
-        return 0;
-    legend_title(picture->shading, title, sizeof title);
-    float wide = drape_overlay_legend_width(o, title) + MARGIN * o->unit;
-    return (int)fminf(wide, STRIP * (float)o->width);
-}
-
 static int columns_of(int panel_count)
 {
     return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
@@ -40,7 +29,14 @@ drape_rectangle drape_layout_inner(const drape_overlay *overlay, const drape_pic
 {
     int count = picture->panel_count, columns = columns_of(count), rows = (count + columns - 1) / columns;
     int column = panel % columns, row = rows - 1 - panel / columns;
-    int left = (int)picture->column, width = overlay->width - left - strip_of(overlay, picture);
+    int left = (int)picture->column, strip = 0; /* at the right, for the legend [pixels] */
+    if (picture->shading->field) {
+        char title[80];
+        legend_title(picture->shading, title, sizeof title);
+        float wide = drape_overlay_legend_width(overlay, title) + MARGIN * overlay->unit;
+        strip = (int)fminf(wide, STRIP * (float)overlay->width);
+    }
+    int width = overlay->width - left - strip;
     drape_rectangle b = {.left = left + column * width / columns, .bottom = row * overlay->height / rows};
     b.width = left + (column + 1) * width / columns - b.left;
     b.height = (row + 1) * overlay->height / rows - b.bottom;
@@ -60,18 +56,6 @@ drape_rectangle drape_layout_whole(const drape_overlay *overlay, const drape_pic
 }
 
 /* ---- Overlay ---- */
-
-static void put_legend(drape_overlay *o, const drape_picture *picture)
-{
-    const drape_field_ops *field = picture->shading->field;
-    char title[80];
-    if (!field)
-        return;
-    legend_title(picture->shading, title, sizeof title);
-    drape_overlay_legend(o, (float)o->width - 22 * o->unit, (float)o->height - 26 * o->unit,
-                         fminf(fmaxf(0.36f * (float)o->height, LEGEND * o->unit), 0.6f * (float)o->height),
-                         title, field->shown * picture->low, field->shown * picture->high);
-}
 
 static void put_labels(drape_overlay *o, const drape_picture *picture)
 {
@@ -117,45 +101,42 @@ static int put_wrapped(drape_overlay *o, float x, float y, float right, const fl
     return lines;
 }
 
-/* The text before a tab is a name, put in a fainter colour, of the value after it. */
-static int put_line(drape_overlay *o, float x, float y, float right, bool put, const char *text)
-{
-    const char *tab = strchr(text, '\t');
-    char name[80];
-    if (!tab)
-        return put_wrapped(o, x, y, right, put ? drape_ink : NULL, text);
-    snprintf(name, sizeof name, "%.*s", (int)(tab - text), text);
-    if (put)
-        drape_overlay_text(o, x, y, DRAPE_LEFT, drape_faint, name);
-    return put_wrapped(o, x + TAB * o->unit, y, right, put ? drape_ink : NULL, tab + 1);
-}
-
-static int put_all(drape_overlay *o, const drape_picture *picture, bool put)
+/* The text before a tab is a name, put in a fainter colour, of the value after it. Returns the number of lines. */
+static int put_lines(drape_overlay *o, const drape_picture *picture, bool put)
 {
     float left = MARGIN * o->unit, right = picture->column > 0 ? picture->column : (float)o->width - left;
     int count = 0;
-    for (int i = 0; picture->lines[i]; i++)
-        count += put_line(o, left, (30 + (float)count * LINE) * o->unit, right, put, picture->lines[i]);
+    for (int i = 0; picture->lines[i]; i++) {
+        const char *text = picture->lines[i], *tab = strchr(text, '\t');
+        float y = (30 + (float)count * LINE) * o->unit;
+        char name[80];
+        snprintf(name, sizeof name, "%.*s", tab ? (int)(tab - text) : 0, text);
+        if (put && tab)
+            drape_overlay_text(o, left, y, DRAPE_LEFT, drape_faint, name);
+        count += put_wrapped(o, tab ? left + TAB * o->unit : left, y, right, put ? drape_ink : NULL,
+                             tab ? tab + 1 : text);
+    }
     return count;
-}
-
-/* On a translucent ground, to be readable over cloth too. */
-static void put_lines(drape_overlay *o, const drape_picture *picture)
-{
-    if (!picture->lines || !picture->lines[0])
-        return;
-    float wide = picture->column > 0 ? picture->column : (float)o->width;
-    drape_overlay_box(o, 10 * o->unit, 9 * o->unit, wide - 4 * o->unit,
-                      ((float)put_all(o, picture, false) * LINE + 12) * o->unit, veil);
-    put_all(o, picture, true);
 }
 
 void drape_layout_put(drape_overlay *overlay, const drape_picture *picture)
 {
-    put_legend(overlay, picture);
+    const drape_field_ops *field = picture->shading->field;
+    const float u = overlay->unit, width = (float)overlay->width, height = (float)overlay->height;
+    if (field) {
+        char title[80];
+        legend_title(picture->shading, title, sizeof title);
+        drape_overlay_legend(overlay, width - 22 * u, height - 26 * u,
+                             fminf(fmaxf(0.36f * height, LEGEND * u), 0.6f * height), title,
+                             field->shown * picture->low, field->shown * picture->high);
+    }
     put_labels(overlay, picture);
-    put_lines(overlay, picture);
+    if (picture->lines && picture->lines[0]) { /* on a translucent ground, to be readable over cloth too */
+        const float wide = picture->column > 0 ? picture->column : width;
+        drape_overlay_box(overlay, 10 * u, 9 * u, wide - 4 * u,
+                          ((float)put_lines(overlay, picture, false) * LINE + 12) * u, veil);
+        put_lines(overlay, picture, true);
+    }
     if (picture->caption)
-        drape_overlay_text(overlay, MARGIN * overlay->unit, (float)overlay->height - 22 * overlay->unit,
-                           DRAPE_LEFT, drape_faint, picture->caption);
+        drape_overlay_text(overlay, MARGIN * u, height - 22 * u, DRAPE_LEFT, drape_faint, picture->caption);
 }

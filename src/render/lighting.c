@@ -149,10 +149,11 @@ static GLuint texture(GLenum format, int width, int height, GLenum pixels, GLenu
     return name;
 }
 
-static bool create_buffers(drape_lighting *v)
+drape_status drape_lighting_create(drape_context *ctx, int width, int height, drape_lighting *v)
 {
+    const char *const vertex[] = {screen_vertex, NULL};
+    *v = (drape_lighting){.width = (width + SHARE - 1) / SHARE, .height = (height + SHARE - 1) / SHARE};
     const int w = v->width, h = v->height;
-    bool complete = true;
     v->shadow_buffer = drape_gl_framebuffer();
     v->shadow = texture(GL_DEPTH_COMPONENT24, SHADOW, SHADOW, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT,
                         GL_DEPTH_ATTACHMENT);
@@ -163,20 +164,13 @@ static bool create_buffers(drape_lighting *v)
     v->normal = texture(GL_RGBA16F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT1);
     v->depth = drape_gl_buffer(0, GL_DEPTH_COMPONENT24, w, h, GL_DEPTH_ATTACHMENT);
     glDrawBuffers(2, (const GLenum[]){GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1});
-    complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    bool complete = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
     v->raw_buffer = drape_gl_framebuffer();
     v->raw = texture(GL_RGBA32F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT0);
     complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
     v->result_buffer = drape_gl_framebuffer();
     v->result = texture(GL_RGBA32F, w, h, GL_RGBA, GL_FLOAT, GL_COLOR_ATTACHMENT0);
-    return complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
-}
-
-drape_status drape_lighting_create(drape_context *ctx, int width, int height, drape_lighting *v)
-{
-    const char *const vertex[] = {screen_vertex, NULL};
-    *v = (drape_lighting){.width = (width + SHARE - 1) / SHARE, .height = (height + SHARE - 1) / SHARE};
-    bool complete = create_buffers(v);
+    complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
     glGenVertexArrays(1, &v->empty);
     drape_status status = drape_gl_check(ctx, "make the buffers of light");
     if (!status && !complete)

@@ -22,32 +22,10 @@ static bool have_library(const char *name)
     return dlopen(name, RTLD_LAZY | RTLD_GLOBAL) != NULL;
 }
 
-static drape_status check_libraries(drape_context *ctx)
-{
-    if (!have_library("libEGL.so.1"))
-        return drape_fail(ctx, DRAPE_E_FILE, "there is no libEGL.so.1 to draw with: " HINT);
-    if (!have_library("libOpenGL.so.0") && !have_library("libGL.so.1"))
-        return drape_fail(ctx, DRAPE_E_FILE, "there is no libGL.so.1 to draw with: " HINT);
-    return DRAPE_OK;
-}
-
-static EGLDisplay open_display(void)
+static drape_status open_all(drape_offscreen *o)
 {
     const EGLenum platforms[] = {EGL_PLATFORM_SURFACELESS_MESA, EGL_PLATFORM_DEVICE_EXT};
     const char *const names[] = {"EGL_MESA_platform_surfaceless", "EGL_EXT_platform_device"};
-    const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-    for (int i = 0; extensions && i < 2; i++) {
-        EGLDisplay display = strstr(extensions, names[i])
-                                 ? eglGetPlatformDisplayEXT(platforms[i], EGL_DEFAULT_DISPLAY, NULL)
-                                 : EGL_NO_DISPLAY;
-        if (display != EGL_NO_DISPLAY && eglInitialize(display, NULL, NULL))
-            return display;
-    }
-    return EGL_NO_DISPLAY;
-}
-
-static EGLContext open_context(EGLDisplay display)
-{
     static const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                                     EGL_NONE};
     static const EGLint version[] = {EGL_CONTEXT_MAJOR_VERSION,
@@ -59,22 +37,27 @@ static EGLContext open_context(EGLDisplay display)
                                      EGL_NONE};
     EGLConfig config = NULL; /* EGL_NO_CONFIG_KHR: the context only draws into its own buffers */
     EGLint count = 0;
-    if (!eglBindAPI(EGL_OPENGL_API))
-        return EGL_NO_CONTEXT;
-    eglChooseConfig(display, wanted, &config, 1, &count);
-    return eglCreateContext(display, count ? config : NULL, EGL_NO_CONTEXT, version);
-}
-
-static drape_status open_all(drape_offscreen *o)
-{
+    bool opened = false;
     setenv("EGL_LOG_LEVEL", "fatal", 0); /* Mesa would report the drivers that it tries on stderr */
-    drape_status status = check_libraries(o->ctx);
-    if (status)
-        return status;
-    o->display = open_display();
-    if (o->display == EGL_NO_DISPLAY)
+    if (!have_library("libEGL.so.1"))
+        return drape_fail(o->ctx, DRAPE_E_FILE, "there is no libEGL.so.1 to draw with: " HINT);
+    if (!have_library("libOpenGL.so.0") && !have_library("libGL.so.1"))
+        return drape_fail(o->ctx, DRAPE_E_FILE, "there is no libGL.so.1 to draw with: " HINT);
+    const char *extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+    for (int i = 0; extensions && !opened && i < 2; i++) {
+        o->display = strstr(extensions, names[i])
+                         ? eglGetPlatformDisplayEXT(platforms[i], EGL_DEFAULT_DISPLAY, NULL)
+                         : EGL_NO_DISPLAY;
+        opened = o->display != EGL_NO_DISPLAY && eglInitialize(o->display, NULL, NULL);
+    }
+    if (!opened) {
+        o->display = EGL_NO_DISPLAY;
         return drape_fail(o->ctx, DRAPE_E_FILE, "EGL has no driver that draws without a display: " HINT);
-    o->context = open_context(o->display);
+    }
+    if (eglBindAPI(EGL_OPENGL_API)) {
+        eglChooseConfig(o->display, wanted, &config, 1, &count);
+        o->context = eglCreateContext(o->display, count ? config : NULL, EGL_NO_CONTEXT, version);
+    }
     if (o->context == EGL_NO_CONTEXT)
         return drape_fail(o->ctx, DRAPE_E_FILE, "EGL has no OpenGL 3.3 (error 0x%04x): " HINT,
                           (unsigned)eglGetError());

@@ -116,18 +116,14 @@ void drape_overlay_text(drape_overlay *o, float x, float y, drape_align align, c
     }
 }
 
-/* 1, 2 or 5 times a power of ten, such that at most `ticks` steps fill the range. */
-static double round_step(double range, double ticks)
-{
-    double rough = range / ticks, power = pow(10, floor(log10(rough))), s = rough / power;
-    return power * (s <= 1 ? 1 : s <= 2 ? 2 : s <= 5 ? 5 : 10);
-}
-
 void drape_overlay_legend(drape_overlay *o, float right, float bottom, float tall, const char *title,
                           double low, double high)
 {
     float u = o->unit, wide = roundf(16 * u), gap = 7 * u;
-    double step = round_step(high - low, fmin(TICKS, tall / (2.2 * o->font.height)));
+    /* 1, 2 or 5 times a power of ten, such that at most TICKS steps fill the range, or as many as have room. */
+    double rough = (high - low) / fmin(TICKS, tall / (2.2 * o->font.height));
+    double power = pow(10, floor(log10(rough))), s = rough / power;
+    double step = power * (s <= 1 ? 1 : s <= 2 ? 2 : s <= 5 ? 5 : 10);
     char text[40];
     float widest = 0;
     for (double value = ceil(low / step) * step; value <= high + 1e-9 * step; value += step) {

@@ -192,19 +192,6 @@ static GLuint program(drape_context *ctx, const char *name, const char *vertex, 
                             (const char *const[]){first, second, NULL});
 }
 
-static bool create_programs(drape_painter *p)
-{
-    static const char *const body[] = {body_source, surface_main, NULL};
-    static const char *const ground[] = {wall_source, ground_source, NULL};
-    return (p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
-           (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
-           (p->body = surface_program(p->ctx, "body", body)) &&
-           (p->ground = surface_program(p->ctx, "ground", ground)) &&
-           (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
-           (p->wire = program(p->ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
-           (p->pin = program(p->ctx, "pin", pin_vertex, pin_fragment, NULL));
-}
-
 static drape_status make_texture(drape_painter *p, int which, const char *path)
 {
     static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
@@ -217,6 +204,8 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     static const int sizes[] = {3, 3, 0};
     static const float square[] = {-1, 0, 1, 0, 1, 0, 1, 0, 1,  0, 1, 0, 1,  0, -1, 0, 1, 0,
                                    -1, 0, 1, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, -1, 0, 1, 0};
+    static const char *const body[] = {body_source, surface_main, NULL};
+    static const char *const ground[] = {wall_source, ground_source, NULL};
     const char *const paths[] = {def->pattern, def->heights, def->environment};
     drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
     if (!status)
@@ -226,7 +215,13 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
             status = make_texture(p, i, paths[i]);
-    if (!status && !create_programs(p))
+    if (!status && !((p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
+                     (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
+                     (p->body = surface_program(p->ctx, "body", body)) &&
+                     (p->ground = surface_program(p->ctx, "ground", ground)) &&
+                     (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
+                     (p->wire = program(p->ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
+                     (p->pin = program(p->ctx, "pin", pin_vertex, pin_fragment, NULL))))
         status = DRAPE_E_FILE;
     if (status)
         return status;
@@ -280,18 +275,6 @@ const drape_canvas *drape_painter_canvas(const drape_painter *painter)
 drape_overlay *drape_painter_overlay(drape_painter *painter)
 {
     return &painter->overlay;
-}
-
-/* Compiled when it is first used, as drivers are slow at it. */
-static GLuint shading_program(drape_painter *p, const drape_shading *shading)
-{
-    int i = 0;
-    while (i + 1 < MAX_SHADINGS && drape_shadings[i] && drape_shadings[i] != shading)
-        i++;
-    if (!p->shadings[i])
-        p->shadings[i] = surface_program(p->ctx, shading->entry.name,
-                                         (const char *const[]){shading->source, surface_main, NULL});
-    return p->shadings[i];
 }
 
 /* ---- One panel ---- */
@@ -408,16 +391,6 @@ static void draw_cloth(GLuint program, const drape_stage *stage, const drape_sha
     glDrawElements(GL_TRIANGLES, stage->hem.index_count, GL_UNSIGNED_INT, NULL);
 }
 
-/* The background, wherever nothing else was drawn. */
-static void draw_wall(const drape_painter *p, const panel_view *v)
-{
-    glUseProgram(p->wall);
-    set_box(p->wall, "box", v);
-    glBindVertexArray(p->empty);
-    glDepthFunc(GL_LEQUAL);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-}
-
 /* Endless colliders; if there are none, a floor that shows the shadow. */
 static void draw_ground(const drape_painter *p, const drape_stage *stage, GLuint program, const panel_view *v)
 {
@@ -523,7 +496,12 @@ static void draw_scene(drape_painter *p, const drape_picture *picture, const dra
         draw_shaded(p, picture, stage, program, v);
     draw_bounded(p, stage, p->body, v);
     draw_ground(p, stage, p->ground, v);
-    draw_wall(p, v);
+    /* The background, wherever nothing else was drawn. */
+    glUseProgram(p->wall);
+    set_box(p->wall, "box", v);
+    glBindVertexArray(p->empty);
+    glDepthFunc(GL_LEQUAL);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
     if (!transparent)
         return;
     v->behind = drape_canvas_copy(&p->canvas);
@@ -537,7 +515,13 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     const drape_panel *panel = &picture->panels[index];
     const drape_shading *shading = picture->shading;
     drape_stage *stage = panel->stage;
-    GLuint program = shading_program(p, shading);
+    int number = 0;
+    while (number + 1 < MAX_SHADINGS && drape_shadings[number] && drape_shadings[number] != shading)
+        number++;
+    if (!p->shadings[number]) /* compiled when it is first used, as drivers are slow at it */
+        p->shadings[number] = surface_program(p->ctx, shading->entry.name,
+                                              (const char *const[]){shading->source, surface_main, NULL});
+    GLuint program = p->shadings[number];
     const drape_rectangle whole = drape_layout_whole(&p->overlay, picture, index);
     panel_view v = {.left = whole.left,
                     .bottom = whole.bottom,

@@ -36,50 +36,39 @@ void drape_reel_clear(drape_reel *reel)
     reel->high = -INFINITY;
 }
 
-static drape_status reserve(drape_reel *r)
-{
-    if (r->count < r->capacity)
-        return DRAPE_OK;
-    r->capacity = r->capacity ? 2 * r->capacity : 1;
-    r->times = drape_arena_resize(&r->arena, r->times, r->capacity, sizeof *r->times);
-    r->positions = drape_arena_resize(&r->arena, r->positions, r->capacity, 3 * r->nodes * sizeof(float));
-    if (r->with_values)
-        r->values = drape_arena_resize(&r->arena, r->values, r->capacity, r->nodes * sizeof(float));
-    return drape_arena_status(&r->arena);
-}
-
-/* Positions of the surface for nodes at x. */
-static const double *surface_of(drape_reel *r, const double *x)
-{
-    if (!r->shown)
-        return x;
-    drape_model_normals(r->model, x, r->normals);
-    drape_render_positions(r->model, -1, x, r->normals, r->shown);
-    return r->shown;
-}
-
-drape_status drape_reel_add(drape_reel *reel, double t, const double *x, drape_sim *sim,
+drape_status drape_reel_add(drape_reel *r, double t, const double *x, drape_sim *sim,
                             const drape_field_ops *field)
 {
-    const double *values = reel->shown ? reel->shown_values : reel->scratch;
-    drape_status status = reserve(reel);
+    const double *values = r->shown ? r->shown_values : r->scratch;
+    if (r->count == r->capacity) {
+        r->capacity = r->capacity ? 2 * r->capacity : 1;
+        r->times = drape_arena_resize(&r->arena, r->times, r->capacity, sizeof *r->times);
+        r->positions = drape_arena_resize(&r->arena, r->positions, r->capacity, 3 * r->nodes * sizeof(float));
+        if (r->with_values)
+            r->values = drape_arena_resize(&r->arena, r->values, r->capacity, r->nodes * sizeof(float));
+    }
+    drape_status status = drape_arena_status(&r->arena);
     if (status)
         return status;
-    const double *shown = surface_of(reel, x);
-    reel->times[reel->count] = t;
-    for (size_t i = 0; i < 3 * reel->nodes; i++)
-        reel->positions[3 * reel->nodes * reel->count + i] = (float)shown[i];
+    if (r->shown) {
+        drape_model_normals(r->model, x, r->normals);
+        drape_render_positions(r->model, -1, x, r->normals, r->shown);
+    }
+    const double *shown = r->shown ? r->shown : x;
+    r->times[r->count] = t;
+    for (size_t i = 0; i < 3 * r->nodes; i++)
+        r->positions[3 * r->nodes * r->count + i] = (float)shown[i];
     if (field)
-        status = field->measure(sim, x, reel->scratch);
-    if (field && !status && reel->shown)
-        drape_render_values(reel->model, reel->scratch, 1, reel->shown_values);
-    for (size_t i = 0; field && i < reel->nodes && !status; i++) {
-        reel->values[reel->count * reel->nodes + i] = (float)values[i];
-        reel->low = fmin(reel->low, values[i]);
-        reel->high = fmax(reel->high, values[i]);
+        status = field->measure(sim, x, r->scratch);
+    if (field && !status && r->shown)
+        drape_render_values(r->model, r->scratch, 1, r->shown_values);
+    for (size_t i = 0; field && i < r->nodes && !status; i++) {
+        r->values[r->count * r->nodes + i] = (float)values[i];
+        r->low = fmin(r->low, values[i]);
+        r->high = fmax(r->high, values[i]);
     }
     if (!status)
-        reel->count++;
+        r->count++;
     return status;
 }
 

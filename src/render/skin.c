@@ -55,25 +55,6 @@ static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
                       (size_t)t * inner_points(n) + before + (size_t)(i - 1));
 }
 
-/* The corners of the level^2 triangles that each triangle of the mesh is drawn as. */
-static void make_indices(drape_skin *s)
-{
-    uint32_t *to = s->index;
-    for (int32_t t = 0; t < s->triangle_count; t++)
-        for (int j = 0; j < s->level; j++)
-            for (int i = 0; i + j < s->level; i++) {
-                *to++ = point_number(s, t, i, j);
-                *to++ = point_number(s, t, i + 1, j);
-                *to++ = point_number(s, t, i, j + 1);
-                if (i + j + 1 == s->level)
-                    continue;
-                *to++ = point_number(s, t, i + 1, j);
-                *to++ = point_number(s, t, i + 1, j + 1);
-                *to++ = point_number(s, t, i, j + 1);
-            }
-    s->index_count = (size_t)(to - s->index);
-}
-
 /* ---- Texture coordinates ---- */
 
 /* Texture coordinates of a grid: rest distances along its first row, and across it. */
@@ -121,35 +102,6 @@ static void flatten(const drape_mesh *mesh, float *uv)
     }
 }
 
-/* Triangles run counterclockwise seen from the front. Unless they do so in the texture, it appears
- * mirrored. */
-static bool is_mirrored(const drape_mesh *mesh, const float *uv)
-{
-    double area = 0;
-    for (size_t t = 0; t < (size_t)mesh->triangle_count; t++) {
-        const float *a = uv + 2 * mesh->triangle[3 * t], *b = uv + 2 * mesh->triangle[3 * t + 1],
-                    *c = uv + 2 * mesh->triangle[3 * t + 2];
-        area += (double)((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
-    }
-    return area < 0;
-}
-
-/* Whether v falls with height at rest, by linear regression: the texture would stand on its head. */
-static bool is_upside_down(const drape_mesh *mesh, const float *uv)
-{
-    double n = mesh->node_count, y = 0, v = 0, product = 0, square = 0;
-    for (int32_t i = 0; i < mesh->node_count; i++) {
-        y += mesh->x[3 * i + 1] / n;
-        v += (double)uv[2 * i + 1] / n;
-    }
-    for (int32_t i = 0; i < mesh->node_count; i++) {
-        double above = mesh->x[3 * i + 1] - y, along = (double)uv[2 * i + 1] - v;
-        product += above * along;
-        square += above * above;
-    }
-    return product < 0 && product * product > 1e-6 * square;
-}
-
 /* Reverses u (k = 0) or v (k = 1). */
 static void reverse(const drape_mesh *mesh, float *uv, int k)
 {
@@ -166,9 +118,28 @@ static void unroll(const drape_mesh *mesh, float *uv)
         unroll_grid(mesh, uv);
     else
         flatten(mesh, uv);
-    if (is_mirrored(mesh, uv))
+    /* Triangles run counterclockwise seen from the front. Unless they do so in the texture, it appears
+     * mirrored. */
+    double area = 0;
+    for (size_t t = 0; t < (size_t)mesh->triangle_count; t++) {
+        const float *a = uv + 2 * mesh->triangle[3 * t], *b = uv + 2 * mesh->triangle[3 * t + 1],
+                    *c = uv + 2 * mesh->triangle[3 * t + 2];
+        area += (double)((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+    }
+    if (area < 0)
         reverse(mesh, uv, 1);
-    if (!is_upside_down(mesh, uv))
+    /* If v falls with height at rest, by linear regression, the texture would stand on its head. */
+    double n = mesh->node_count, y = 0, v = 0, product = 0, square = 0;
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        y += mesh->x[3 * i + 1] / n;
+        v += (double)uv[2 * i + 1] / n;
+    }
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        double above = mesh->x[3 * i + 1] - y, along = (double)uv[2 * i + 1] - v;
+        product += above * along;
+        square += above * above;
+    }
+    if (!(product < 0 && product * product > 1e-6 * square))
         return;
     reverse(mesh, uv, 0);
     reverse(mesh, uv, 1);
@@ -214,19 +185,6 @@ static drape_status create_hem(drape_arena *arena, drape_skin *s)
         }
     s->hem_index_count = (size_t)(to - s->hem_index);
     return DRAPE_OK;
-}
-
-static float mean_edge(const drape_skin *s)
-{
-    const drape_model *m = s->model;
-    double sum = 0;
-    for (int32_t e = 0; e < s->edge_count; e++) {
-        double d[3];
-        vec3_sub(m->surface.rest + 3 * (size_t)s->edges[2 * (size_t)e + 1],
-                 m->surface.rest + 3 * (size_t)s->edges[2 * (size_t)e], d);
-        sum += m->surface.bound ? vec3_norm(d) : m->edge_length[e];
-    }
-    return (float)(sum / s->edge_count);
 }
 
 static int compare_edges(const void *left, const void *right)
@@ -287,7 +245,14 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
     skin->gap = drape_arena_take(arena, nodes, sizeof *skin->gap);
     skin->roundness = drape_arena_take(arena, (size_t)skin->edge_count, sizeof *skin->roundness);
     skin->outward = drape_arena_take(arena, 3 * nodes, sizeof *skin->outward);
-    skin->edge = mean_edge(skin);
+    double sum = 0;
+    for (int32_t e = 0; e < skin->edge_count; e++) {
+        double d[3];
+        vec3_sub(surface->rest + 3 * (size_t)skin->edges[2 * (size_t)e + 1],
+                 surface->rest + 3 * (size_t)skin->edges[2 * (size_t)e], d);
+        sum += surface->bound ? vec3_norm(d) : model->edge_length[e];
+    }
+    skin->edge = (float)(sum / skin->edge_count);
     skin->hem_radius = fminf(HEM * (float)model->length, HEM_GRID * skin->edge);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
@@ -296,7 +261,21 @@ drape_status drape_skin_create(drape_arena *arena, const drape_model *model, dra
         int32_t e = drape_edge_between(skin->edges, skin->edge_count, a, b);
         skin->triangle_edge[i] = a < b ? e : -1 - e;
     }
-    make_indices(skin);
+    /* The corners of the level^2 triangles that each triangle of the mesh is drawn as. */
+    uint32_t *to = skin->index;
+    for (int32_t t = 0; t < skin->triangle_count; t++)
+        for (int j = 0; j < skin->level; j++)
+            for (int i = 0; i + j < skin->level; i++) {
+                *to++ = point_number(skin, t, i, j);
+                *to++ = point_number(skin, t, i + 1, j);
+                *to++ = point_number(skin, t, i, j + 1);
+                if (i + j + 1 == skin->level)
+                    continue;
+                *to++ = point_number(skin, t, i + 1, j);
+                *to++ = point_number(skin, t, i + 1, j + 1);
+                *to++ = point_number(skin, t, i, j + 1);
+            }
+    skin->index_count = (size_t)(to - skin->index);
     for (int32_t c = 0, first = 0; c < surface->cloth_count; c++) {
         const drape_mesh *mesh = surface->cloths[c].mesh;
         unroll(mesh, skin->uv + 2 * (size_t)first);
@@ -390,13 +369,6 @@ static float clearance(const drape_skin *s, double t, const float *p)
     return (float)nearest;
 }
 
-/* Whether a curved point is nearer to a collider than it may be. */
-static bool cuts(const drape_skin *s, double t, const float *curved, const float *flat)
-{
-    float enough = CLEARANCE * s->edge, d = clearance(s, t, curved);
-    return d < enough && d < clearance(s, t, flat) - 1e-3f * enough;
-}
-
 /* Moves curved points towards the flat ones, all by the same share, until none of them cuts a collider.
  * Returns what remains of the difference, at most `roundness`. */
 static float flatten_points(const drape_skin *s, double t, drape_skin_vertex *point, const float (*flat)[3],
@@ -408,7 +380,8 @@ static float flatten_points(const drape_skin *s, double t, drape_skin_vertex *po
         for (bool cut = true; cut && remains > 0;) {
             for (int k = 0; k < 3; k++)
                 curved[k] = flat[i][k] + remains * (point[i].p[k] - flat[i][k]);
-            cut = cuts(s, t, curved, flat[i]);
+            float enough = CLEARANCE * s->edge, d = clearance(s, t, curved);
+            cut = d < enough && d < clearance(s, t, flat[i]) - 1e-3f * enough;
             if (cut)
                 remains = ++tries < TRIES ? FLATTER * remains : 0;
         }
@@ -504,30 +477,6 @@ typedef struct patch {
     float inside[3], normal[3][3];
 } patch;
 
-static void make_patch(const drape_skin *s, int32_t t, patch *p)
-{
-    for (int k = 0; k < 3; k++)
-        p->corner[k] = &s->vertex[s->triangle[3 * (size_t)t + (size_t)k]];
-    for (int k = 0; k < 3; k++) {
-        const drape_skin_vertex *a = p->corner[k], *b = p->corner[(k + 1) % 3];
-        control_point(a, b, p->side[k][0]);
-        control_point(b, a, p->side[k][1]);
-        for (int i = 0; i < 3; i++) {
-            p->side[k][0][i] += a->p[i];
-            p->side[k][1][i] += b->p[i];
-        }
-        middle_normal(a, b, p->normal[k]);
-    }
-    for (int i = 0; i < 3; i++) {
-        float sum = 0, corners = 0;
-        for (int k = 0; k < 3; k++) {
-            sum += p->side[k][0][i] + p->side[k][1][i];
-            corners += p->corner[k]->p[i];
-        }
-        p->inside[i] = sum / 4 - corners / 6; /* E + (E - V) / 2 */
-    }
-}
-
 /* The point with the weights w of the corners. */
 static void update_inner(const patch *p, const float *w, drape_skin_vertex *to)
 {
@@ -553,7 +502,26 @@ static void update_triangle(drape_skin *s, double t, int32_t triangle)
     float n = (float)s->level, flat[MAX_LEVEL * MAX_LEVEL][3], nearest = INFINITY, longest = 0, roundness = 1;
     size_t count = 0;
     drape_skin_vertex *first = &s->vertex[point_number(s, triangle, 1, 1)];
-    make_patch(s, triangle, &p);
+    for (int k = 0; k < 3; k++)
+        p.corner[k] = &s->vertex[s->triangle[3 * (size_t)triangle + (size_t)k]];
+    for (int k = 0; k < 3; k++) {
+        const drape_skin_vertex *a = p.corner[k], *b = p.corner[(k + 1) % 3];
+        control_point(a, b, p.side[k][0]);
+        control_point(b, a, p.side[k][1]);
+        for (int i = 0; i < 3; i++) {
+            p.side[k][0][i] += a->p[i];
+            p.side[k][1][i] += b->p[i];
+        }
+        middle_normal(a, b, p.normal[k]);
+    }
+    for (int i = 0; i < 3; i++) {
+        float sum = 0, corners = 0;
+        for (int k = 0; k < 3; k++) {
+            sum += p.side[k][0][i] + p.side[k][1][i];
+            corners += p.corner[k]->p[i];
+        }
+        p.inside[i] = sum / 4 - corners / 6; /* E + (E - V) / 2 */
+    }
     for (int j = 1; j < s->level; j++)
         for (int i = 1; i + j < s->level; i++, count++) {
             const float w[3] = {(n - (float)i - (float)j) / n, (float)i / n, (float)j / n};
@@ -585,22 +553,6 @@ void drape_skin_update(drape_skin *skin, double t, const float *positions, const
 
 /* ---- The hem ---- */
 
-/* Adds the direction out of a side of a triangle to that of its ends: T x n, with T along the side. */
-static void add_outward(drape_skin *s, const int32_t *corner, int side)
-{
-    const drape_skin_vertex *a = &s->vertex[corner[side]], *b = &s->vertex[corner[(side + 1) % 3]];
-    float along[3], normal[3], out[3];
-    subtract(b->p, a->p, along);
-    for (int k = 0; k < 3; k++)
-        normal[k] = a->n[k] + b->n[k];
-    drape_cross(along, normal, out);
-    drape_normalize(out);
-    for (int k = 0; k < 3; k++) {
-        s->outward[3 * (size_t)corner[side] + (size_t)k] += out[k];
-        s->outward[3 * (size_t)corner[(side + 1) % 3] + (size_t)k] += out[k];
-    }
-}
-
 /* A ring of the hem around a point of the border: its upper half as part of the front, and its lower one as
  * part of the back. */
 static drape_skin_vertex *put_ring(const drape_skin *s, const drape_skin_vertex *point, const float *outward,
@@ -627,8 +579,23 @@ void drape_skin_update_hem(drape_skin *skin)
     const int n = skin->level;
     drape_skin_vertex *to = skin->hem;
     memset(skin->outward, 0, 3 * (size_t)skin->node_count * sizeof *skin->outward);
-    for (size_t i = 0; i < skin->border_count; i++)
-        add_outward(skin, skin->triangle + 3 * (size_t)skin->border[2 * i], skin->border[2 * i + 1]);
+    /* The direction out of each side, T x n with T along it, is added to that of its ends. */
+    for (size_t i = 0; i < skin->border_count; i++) {
+        const int32_t *corner = skin->triangle + 3 * (size_t)skin->border[2 * i],
+                      side = skin->border[2 * i + 1];
+        const size_t from = (size_t)corner[side], to_node = (size_t)corner[(side + 1) % 3];
+        const drape_skin_vertex *a = &skin->vertex[from], *b = &skin->vertex[to_node];
+        float along[3], normal[3], out[3];
+        subtract(b->p, a->p, along);
+        for (int k = 0; k < 3; k++)
+            normal[k] = a->n[k] + b->n[k];
+        drape_cross(along, normal, out);
+        drape_normalize(out);
+        for (size_t k = 0; k < 3; k++) {
+            skin->outward[3 * from + k] += out[k];
+            skin->outward[3 * to_node + k] += out[k];
+        }
+    }
     for (size_t i = 0; i < skin->border_count; i++) {
         const int32_t t = skin->border[2 * i], side = skin->border[2 * i + 1];
         const int32_t *corner = skin->triangle + 3 * (size_t)t;

@@ -23,17 +23,6 @@ static void place(const drape_stage_body *body, const float *vertex, float *p)
                body->offset[k];
 }
 
-static drape_status take_deformed(drape_stage *s, int32_t c)
-{
-    const drape_collider *collider = &s->model->colliders[c];
-    drape_stage_body *body = &s->bodies[c];
-    body->points = drape_arena_take(&s->arena, (size_t)collider->shape.point_count, 3 * sizeof(double));
-    const drape_status status = drape_deformed_create(&s->arena, collider, &body->deformed);
-    if (!status)
-        s->collider[c] = &body->deformed->collider;
-    return body->points ? status : DRAPE_E_MEMORY;
-}
-
 static drape_status create_bodies(drape_stage *s)
 {
     const drape_model *m = s->model;
@@ -49,8 +38,13 @@ static drape_status create_bodies(drape_stage *s)
         drape_pose_own(&pose, middle, center);
         set_pose(body, &pose);
         s->collider[c] = &m->colliders[c];
-        if (m->colliders[c].frames.frame_count > 0 && take_deformed(s, c))
-            return DRAPE_E_MEMORY;
+        if (m->colliders[c].frames.frame_count > 0) {
+            const size_t points = (size_t)m->colliders[c].shape.point_count;
+            body->points = drape_arena_take(&s->arena, points, 3 * sizeof(double));
+            if (!body->points || drape_deformed_create(&s->arena, &m->colliders[c], &body->deformed))
+                return DRAPE_E_MEMORY;
+            s->collider[c] = &body->deformed->collider;
+        }
         if (drape_body_create(&s->arena, &m->colliders[c], center, 2.5 * m->length, &body->shape))
             return DRAPE_E_MEMORY;
         drape_gl_mesh_create(&body->mesh, sizes, false);

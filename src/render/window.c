@@ -36,27 +36,22 @@ static bool is_held(GLFWwindow *handle, int left, int right)
     return glfwGetKey(handle, left) == GLFW_PRESS || glfwGetKey(handle, right) == GLFW_PRESS;
 }
 
-static int key_of(int key)
+/* Letters are those printed on the key, for any keyboard layout. */
+static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mods)
 {
     static const int keys[][2] = {
         {GLFW_KEY_ESCAPE, DRAPE_KEY_ESCAPE},   {GLFW_KEY_TAB, DRAPE_KEY_TAB},
         {GLFW_KEY_LEFT, DRAPE_KEY_LEFT},       {GLFW_KEY_RIGHT, DRAPE_KEY_RIGHT},
         {GLFW_KEY_UP, DRAPE_KEY_UP},           {GLFW_KEY_DOWN, DRAPE_KEY_DOWN},
         {GLFW_KEY_PAGE_UP, DRAPE_KEY_PAGE_UP}, {GLFW_KEY_PAGE_DOWN, DRAPE_KEY_PAGE_DOWN}};
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        if (keys[i][0] == key)
-            return keys[i][1];
-    return key < 128 ? key : 0;
-}
-
-/* Letters are those printed on the key, for any keyboard layout. */
-static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mods)
-{
     const char *name = glfwGetKeyName(key, scancode);
+    int code = key < 128 ? key : 0;
     if (action == GLFW_RELEASE)
         return;
-    int code = name && name[0] && !name[1] ? name[0] >= 'a' && name[0] <= 'z' ? name[0] - 'a' + 'A' : name[0]
-                                           : key_of(key);
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        code = keys[i][0] == key ? keys[i][1] : code;
+    if (name && name[0] && !name[1])
+        code = name[0] >= 'a' && name[0] <= 'z' ? name[0] - 'a' + 'A' : name[0];
     put(handle, (drape_input){.kind = DRAPE_INPUT_KEY,
                               .key = code,
                               .shift = mods & GLFW_MOD_SHIFT,
