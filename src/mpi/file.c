@@ -1,10 +1,10 @@
 /*
- * file.c: see file.h. Each rank has items here and there in an array, and writes one block of it: the ranks
+ * file.c: see ranks.h. Each rank has items here and there in an array, and writes one block of it: the ranks
  * first send each other the items of their blocks. So every file system gets large requests, which do not
  * overlap, and a rank that cannot write, for instance because the disk is full, leaves no other waiting:
  * collective writes of MPI-IO do, in Open MPI 4.
  */
-#include "mpi/file.h"
+#include "mpi/ranks.h"
 
 #include "base/checksum.h"
 
@@ -14,20 +14,25 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static drape_mpi_ranks *ranks_of(const drape_ranks *ranks)
-{
-    return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
-}
-
 /* ---- Opening and closing ---- */
 
-/* Where ranks do not share the file system, another file may have the same path. Numbers of devices differ
- * between machines, those of files do not. */
-static int open_here(drape_mpi_ranks *r, const char *path)
+int drape_mpi_open(const drape_ranks *ranks, const char *path)
 {
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
+    char there[DRAPE_RANKS_PATH] = "";
     struct stat here;
-    r->file = open(path, O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
-    int error = r->file < 0 || fstat(r->file, &here) ? errno : 0;
+    const size_t length = path && ranks->rank == 0 ? strlen(path) : 0;
+    int error = length == 0 ? ECANCELED : length < DRAPE_RANKS_PATH ? 0 : ENAMETOOLONG;
+    if (ranks->rank == 0 && !error)
+        memcpy(there, path, length);
+    MPI_Bcast(&error, 1, MPI_INT, 0, r->comm);
+    if (error)
+        return error;
+    MPI_Bcast(there, DRAPE_RANKS_PATH, MPI_BYTE, 0, r->comm);
+    /* Where ranks do not share the file system, another file may have the same path. Numbers of devices
+     * differ between machines, those of files do not. */
+    r->file = open(there, O_WRONLY | O_NOFOLLOW | O_CLOEXEC);
+    error = r->file < 0 || fstat(r->file, &here) ? errno : 0;
     uint64_t number = error ? 0 : (uint64_t)here.st_ino;
     MPI_Bcast(&number, 1, MPI_UINT64_T, 0, r->comm);
     if (!error && number != 0 && number != (uint64_t)here.st_ino)
@@ -38,25 +43,10 @@ static int open_here(drape_mpi_ranks *r, const char *path)
     return error;
 }
 
-int drape_mpi_open(const drape_ranks *ranks, const char *path)
-{
-    drape_mpi_ranks *r = ranks_of(ranks);
-    char there[DRAPE_RANKS_PATH] = "";
-    const size_t length = path && ranks->rank == 0 ? strlen(path) : 0;
-    int error = length == 0 ? ECANCELED : length < DRAPE_RANKS_PATH ? 0 : ENAMETOOLONG;
-    if (ranks->rank == 0 && !error)
-        memcpy(there, path, length);
-    MPI_Bcast(&error, 1, MPI_INT, 0, r->comm);
-    if (error)
-        return error;
-    MPI_Bcast(there, DRAPE_RANKS_PATH, MPI_BYTE, 0, r->comm);
-    return open_here(r, there);
-}
-
 /* After EINTR the descriptor is closed, too. */
 int drape_mpi_close(const drape_ranks *ranks, bool durable)
 {
-    drape_mpi_ranks *r = ranks_of(ranks);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     MPI_Bcast(&durable, sizeof durable, MPI_BYTE, 0, r->comm);
     int syncing = 0;
     do
@@ -176,22 +166,10 @@ static int put(int file, off_t offset, const void *data, size_t size)
     return 0;
 }
 
-/* Writes the block of this rank; *sum: what it adds to the checksum. */
-static int put_block(const drape_mpi_ranks *r, int64_t offset, const drape_rows *rows, const items *of,
-                     uint64_t *sum)
-{
-    const int32_t first = first_of(rows, r->base.count, r->base.rank),
-                  end = first_of(rows, r->base.count, r->base.rank + 1);
-    const size_t item = (size_t)rows->width * sizeof(double), size = item * (size_t)(end - first);
-    const int64_t at = offset + (int64_t)item * first;
-    *sum = drape_checksum_bytes((uint64_t)at, of->block, size);
-    return put(r->file, (off_t)at, of->block, size);
-}
-
 int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
                     uint64_t *sum)
 {
-    const drape_mpi_ranks *r = ranks_of(ranks);
+    const drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     items sent = {.arena = drape_arena_of(r->arena.ctx)};
     uint64_t here = 0;
     MPI_Bcast(&offset, 1, MPI_INT64_T, 0, r->comm);
@@ -201,7 +179,12 @@ int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian
     error = (int)drape_ranks_largest(ranks, error);
     if (!error) {
         exchange(r, rows, little_endian, &sent);
-        error = put_block(r, offset, rows, &sent, &here);
+        const int32_t first = first_of(rows, r->base.count, r->base.rank),
+                      end = first_of(rows, r->base.count, r->base.rank + 1);
+        const size_t item = (size_t)rows->width * sizeof(double), size = item * (size_t)(end - first);
+        const int64_t at = offset + (int64_t)item * first;
+        here = drape_checksum_bytes((uint64_t)at, sent.block, size);
+        error = put(r->file, (off_t)at, sent.block, size);
     }
     drape_arena_free(&sent.arena);
     MPI_Allreduce(&here, sum, 1, MPI_UINT64_T, MPI_SUM, r->comm);

@@ -1,11 +1,9 @@
 /*
- * linear.c: see linear.h. The rows of a rank's own nodes are complete in its values, and go into a matrix
- * of PETSc of block size 3.
+ * linear.c: the direct solver of a matrix that ranks share, MUMPS by PETSc; see ranks.h. The rows of a rank's own
+ * nodes are complete in its values, and go into a matrix of PETSc of block size 3.
  *
  * MUMPS has LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
  */
-#include "mpi/linear.h"
-
 #include "mpi/ranks.h"
 
 #include <math.h>
@@ -31,73 +29,6 @@ typedef struct mpi_linear {
     PetscInt workspace; /* from LEAST_WORKSPACE to MOST_WORKSPACE */
 } mpi_linear;
 
-/* ---- The matrix ---- */
-
-/* inside, outside (3 own blocks): the nonzeros of each row in columns here, and in those of other ranks. */
-static void count_nonzeros(const drape_pattern *p, PetscInt *inside, PetscInt *outside)
-{
-    const PetscInt own = p->ranks->own_blocks;
-    for (PetscInt i = 0; i < own; i++) { /* the pattern is symmetric: columns are rows */
-        PetscInt blocks = 0;
-        for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
-            blocks += p->block_row[k] < own;
-        for (PetscInt r = 3 * i; r < 3 * i + 3; r++) {
-            inside[r] = 3 * blocks;
-            outside[r] = 3 * (p->block_start[i + 1] - p->block_start[i] - blocks);
-        }
-    }
-}
-
-static PetscErrorCode create_matrix(mpi_linear *s, const PetscInt *inside, const PetscInt *outside)
-{
-    const PetscInt n = 3 * s->pattern->ranks->own_blocks;
-    PetscErrorCode code = MatCreate(s->ranks->comm, &s->matrix);
-    if (!code)
-        code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE);
-    if (!code)
-        code = MatSetType(s->matrix, MATAIJ);
-    if (!code)
-        code = MatSetBlockSize(s->matrix, 3);
-    if (!code)
-        code = MatSeqAIJSetPreallocation(s->matrix, 0, inside);
-    if (!code)
-        code = MatMPIAIJSetPreallocation(s->matrix, 0, inside, 0, outside);
-    if (!code)
-        code = MatSetOption(s->matrix, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_TRUE);
-    if (!code)
-        code = MatSetOption(s->matrix, MAT_ROW_ORIENTED, PETSC_FALSE);
-    return code;
-}
-
-static PetscErrorCode fill_matrix(mpi_linear *s, const double *values)
-{
-    const drape_pattern *p = s->pattern;
-    const drape_ranks *ranks = p->ranks;
-    PetscErrorCode code = 0;
-    for (int32_t j = 0; j < p->block_count; j++) {
-        const PetscInt column = (PetscInt)ranks->block[j];
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1] && !code; k++) {
-            const int32_t i = p->block_row[k];
-            const PetscInt row = (PetscInt)(i < ranks->own_blocks ? ranks->block[i] : -1);
-            double block[9];
-            int64_t stride;
-            const double *from = drape_pattern_at(p, (double *)(uintptr_t)values, j, k, &stride);
-            if (row < 0)
-                continue;
-            for (int c = 0; c < 3; c++)
-                memcpy(block + 3 * c, from + c * stride, 3 * sizeof *block);
-            code = MatSetValuesBlocked(s->matrix, 1, &row, 1, &column, block, INSERT_VALUES);
-        }
-    }
-    if (!code)
-        code = MatAssemblyBegin(s->matrix, MAT_FINAL_ASSEMBLY);
-    if (!code)
-        code = MatAssemblyEnd(s->matrix, MAT_FINAL_ASSEMBLY);
-    if (!code)
-        code = MatSetOption(s->matrix, MAT_SYMMETRIC, s->symmetric ? PETSC_TRUE : PETSC_FALSE);
-    return code;
-}
-
 /* ---- Creation ---- */
 
 static void destroy(void **state)
@@ -109,136 +40,136 @@ static void destroy(void **state)
     MatDestroy(&s->matrix);
 }
 
-static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *p, void **state)
 {
-    const PetscInt n = 3 * pattern->ranks->own_blocks;
+    const PetscInt own = p->ranks->own_blocks, n = 3 * own;
     mpi_linear *s = drape_arena_take(arena, 1, sizeof *s);
-    PetscInt *nonzeros = drape_arena_take(arena, 2 * (size_t)n, sizeof *nonzeros);
-    double *diagonal = drape_arena_take(arena, (size_t)pattern->n, sizeof *diagonal);
-    const bool good = s && nonzeros && diagonal;
-    if (drape_ranks_agree_memory(pattern->ranks, arena->ctx, good))
+    PetscInt *inside = drape_arena_take(arena, 2 * (size_t)n, sizeof *inside);
+    double *diagonal = drape_arena_take(arena, (size_t)p->n, sizeof *diagonal);
+    const bool good = s && inside && diagonal;
+    if (drape_ranks_agree_memory(p->ranks, arena->ctx, good))
         return DRAPE_E_MEMORY;
-    s->pattern = pattern;
+    s->pattern = p;
     s->diagonal = diagonal;
-    s->ranks = (const drape_mpi_ranks *)pattern->ranks; /* base is its first member */
+    s->ranks = drape_mpi_ranks_of(p->ranks);
     s->workspace = LEAST_WORKSPACE;
-    count_nonzeros(pattern, nonzeros, nonzeros + n);
-    PetscErrorCode code = create_matrix(s, nonzeros, nonzeros + n);
-    drape_arena_release(arena, nonzeros);
-    if (!code)
-        code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->b);
-    if (!code)
-        code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->x);
+    PetscInt *outside = inside + n;
+    /* The nonzeros of each row in columns here, and in those of other ranks: the pattern is symmetric, columns are
+     * rows. */
+    for (PetscInt i = 0; i < own; i++) {
+        PetscInt blocks = 0;
+        for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
+            blocks += p->block_row[k] < own;
+        for (PetscInt r = 3 * i; r < 3 * i + 3; r++) {
+            inside[r] = 3 * blocks;
+            outside[r] = 3 * (p->block_start[i + 1] - p->block_start[i] - blocks);
+        }
+    }
+    PetscErrorCode code;
+    const bool failed = (code = MatCreate(s->ranks->comm, &s->matrix)) ||
+                        (code = MatSetSizes(s->matrix, n, n, PETSC_DETERMINE, PETSC_DETERMINE)) ||
+                        (code = MatSetType(s->matrix, MATAIJ)) || (code = MatSetBlockSize(s->matrix, 3)) ||
+                        (code = MatSeqAIJSetPreallocation(s->matrix, 0, inside)) ||
+                        (code = MatMPIAIJSetPreallocation(s->matrix, 0, inside, 0, outside)) ||
+                        (code = MatSetOption(s->matrix, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_TRUE)) ||
+                        (code = MatSetOption(s->matrix, MAT_ROW_ORIENTED, PETSC_FALSE)) ||
+                        (code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->b)) ||
+                        (code = VecCreateMPIWithArray(s->ranks->comm, 3, n, PETSC_DETERMINE, NULL, &s->x));
+    drape_arena_release(arena, inside);
     *state = s;
-    if (!code)
+    if (!failed)
         return DRAPE_OK;
     destroy(state);
     *state = NULL;
     return drape_fail(arena->ctx, DRAPE_E_SOLVER, "PETSc cannot set up a matrix of %lld unknowns: code %d",
-                      (long long)(3 * pattern->ranks->all_blocks), (int)code);
+                      (long long)(3 * p->ranks->all_blocks), (int)code);
 }
 
 /* ---- Factors ---- */
 
-static PetscErrorCode begin_direct(mpi_linear *s)
+/* Returns whether that failed here, as the next two. */
+static bool fill_matrix(mpi_linear *s, const double *values)
+{
+    const drape_pattern *p = s->pattern;
+    const drape_ranks *ranks = p->ranks;
+    bool failed = false;
+    for (int32_t j = 0; j < p->block_count; j++) {
+        const PetscInt column = (PetscInt)ranks->block[j];
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1] && !failed; k++) {
+            const int32_t i = p->block_row[k];
+            const PetscInt row = (PetscInt)(i < ranks->own_blocks ? ranks->block[i] : -1);
+            double block[9];
+            int64_t stride;
+            const double *from = drape_pattern_at(p, (double *)(uintptr_t)values, j, k, &stride);
+            if (row < 0)
+                continue;
+            for (int c = 0; c < 3; c++)
+                memcpy(block + 3 * c, from + c * stride, 3 * sizeof *block);
+            failed = MatSetValuesBlocked(s->matrix, 1, &row, 1, &column, block, INSERT_VALUES);
+        }
+    }
+    return failed || MatAssemblyBegin(s->matrix, MAT_FINAL_ASSEMBLY) ||
+           MatAssemblyEnd(s->matrix, MAT_FINAL_ASSEMBLY) ||
+           MatSetOption(s->matrix, MAT_SYMMETRIC, s->symmetric ? PETSC_TRUE : PETSC_FALSE);
+}
+
+static bool begin_direct(mpi_linear *s)
 {
     PC pc;
     Mat factors;
-    PetscErrorCode code = KSPDestroy(&s->direct); /* another kind of factors takes another object */
-    if (!code)
-        code = KSPCreate(s->ranks->comm, &s->direct);
-    if (!code)
-        code = KSPSetType(s->direct, KSPPREONLY);
-    if (!code)
-        code = KSPGetPC(s->direct, &pc);
-    if (!code)
-        code = PCSetType(pc, s->symmetric ? PCCHOLESKY : PCLU);
-    if (!code)
-        code = PCFactorSetMatSolverType(pc, MATSOLVERMUMPS);
-    if (!code)
-        code = KSPSetOperators(s->direct, s->matrix, s->matrix);
-    if (!code)
-        code = PCFactorSetUpMatSolverType(pc);
-    if (!code)
-        code = PCFactorGetMatrix(pc, &factors);
-    if (!code)
-        code = MatMumpsSetIcntl(factors, 13, 1); /* else the last front counts no negative pivots */
-    if (!code)
-        code = MatMumpsSetIcntl(factors, 14, s->workspace);
-    if (!code && s->counts)
-        code = MatMumpsSetIcntl(factors, 24, 1); /* counts pivots that are zero, instead of failing */
-    return code;
+    return KSPDestroy(&s->direct) || /* another kind of factors takes another object */
+           KSPCreate(s->ranks->comm, &s->direct) || KSPSetType(s->direct, KSPPREONLY) ||
+           KSPGetPC(s->direct, &pc) || PCSetType(pc, s->symmetric ? PCCHOLESKY : PCLU) ||
+           PCFactorSetMatSolverType(pc, MATSOLVERMUMPS) || KSPSetOperators(s->direct, s->matrix, s->matrix) ||
+           PCFactorSetUpMatSolverType(pc) || PCFactorGetMatrix(pc, &factors) ||
+           MatMumpsSetIcntl(factors, 13, 1) || /* else the last front counts no negative pivots */
+           MatMumpsSetIcntl(factors, 14, s->workspace) ||
+           (s->counts &&
+            MatMumpsSetIcntl(factors, 24, 1)); /* counts pivots that are zero, instead of failing */
 }
 
-/* Whether the workspace or a buffer was too small, by the errors of MUMPS. */
-static bool lacks_workspace(Mat factors)
-{
-    PetscInt error = 0;
-    return !MatMumpsGetInfog(factors, 1, &error) &&
-           (error == -8 || error == -9 || error == -15 || error == -17 || error == -20);
-}
-
-/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. *lacks: there is not
- * enough workspace. */
+/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. *lacks: the workspace or a
+ * buffer was too small, by the errors of MUMPS. */
 static bool factor_once(mpi_linear *s, bool *lacks)
 {
     PCType type = NULL;
     PC pc = NULL;
     Mat factors;
-    PCFailedReason failed = PC_NOERROR;
-    PetscInt negative = 0; /* pivots */
-    PetscErrorCode code = s->direct ? KSPGetPC(s->direct, &pc) : 0;
-    if (!code && pc)
-        code = PCGetType(pc, &type);
-    if (!code && (!pc || strcmp(type, s->symmetric ? PCCHOLESKY : PCLU) != 0))
-        code = begin_direct(s);
-    if (!code)
-        code = KSPSetOperators(s->direct, s->matrix, s->matrix);
-    if (!code)
-        code = KSPGetPC(s->direct, &pc);
-    if (!code)
-        code = KSPSetUp(s->direct);
-    if (!code)
-        code = PCGetFailedReason(pc, &failed);
-    if (!code)
-        code = PCFactorGetMatrix(pc, &factors);
-    *lacks = drape_ranks_any(s->pattern->ranks, !code && failed && lacks_workspace(factors));
-    if (!code && !failed && s->definite)
-        code = MatMumpsGetInfog(factors, 12, &negative);
-    return drape_ranks_all(s->pattern->ranks, !code && !failed && negative == 0);
-}
-
-static bool factor_direct(mpi_linear *s)
-{
-    bool lacks = false, good = factor_once(s, &lacks);
-    while (lacks && s->workspace < MOST_WORKSPACE) {
-        s->workspace *= 2;
-        KSPDestroy(&s->direct);
-        good = factor_once(s, &lacks);
-    }
-    return good;
+    PCFailedReason reason = PC_NOERROR;
+    PetscInt negative = 0 /* pivots */, error = 0;
+    bool failed = s->direct && (KSPGetPC(s->direct, &pc) || PCGetType(pc, &type));
+    if (!failed && (!pc || strcmp(type, s->symmetric ? PCCHOLESKY : PCLU) != 0))
+        failed = begin_direct(s);
+    failed = failed || KSPSetOperators(s->direct, s->matrix, s->matrix) || KSPGetPC(s->direct, &pc) ||
+             KSPSetUp(s->direct) || PCGetFailedReason(pc, &reason) || PCFactorGetMatrix(pc, &factors);
+    const bool small = !failed && reason && !MatMumpsGetInfog(factors, 1, &error) &&
+                       (error == -8 || error == -9 || error == -15 || error == -17 || error == -20);
+    *lacks = drape_ranks_any(s->pattern->ranks, small);
+    failed = failed || reason || (s->definite && MatMumpsGetInfog(factors, 12, &negative));
+    return drape_ranks_all(s->pattern->ranks, !failed && negative == 0);
 }
 
 /* ---- Factor and solve ---- */
 
-static bool is_finite(const drape_pattern *p, const double *values)
-{
-    bool finite = true;
-    for (int64_t i = 0; i < 9 * (int64_t)p->block_start[p->ranks->own_blocks] && finite; i++)
-        finite = isfinite(values[i]);
-    return drape_ranks_all(p->ranks, finite);
-}
-
 static drape_status factor_any(mpi_linear *s, const double *values, bool definite)
 {
+    const drape_pattern *p = s->pattern;
+    bool finite = true, lacks = false;
     s->factored = false;
-    if (!is_finite(s->pattern, values))
+    for (int64_t i = 0; i < 9 * (int64_t)p->block_start[p->ranks->own_blocks] && finite; i++)
+        finite = isfinite(values[i]);
+    if (!drape_ranks_all(p->ranks, finite))
         return DRAPE_RETRY_LINEAR;
-    s->symmetric = s->counts || drape_pattern_is_symmetric(s->pattern, values, s->diagonal);
+    s->symmetric = s->counts || drape_pattern_is_symmetric(p, values, s->diagonal);
     s->definite = definite && s->symmetric;
     if (fill_matrix(s, values))
         return DRAPE_E_SOLVER;
-    s->factored = factor_direct(s);
+    s->factored = factor_once(s, &lacks);
+    while (lacks && s->workspace < MOST_WORKSPACE) {
+        s->workspace *= 2;
+        KSPDestroy(&s->direct);
+        s->factored = factor_once(s, &lacks);
+    }
     return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
@@ -252,28 +183,17 @@ static drape_status factor_definite(void *state, const double *values)
     return factor_any(state, values, true);
 }
 
-/* Whether that succeeded here. */
-static bool apply(mpi_linear *s, const double *b, double *x)
-{
-    KSPConvergedReason reason = 0;
-    PetscErrorCode code = VecPlaceArray(s->b, b);
-    if (!code)
-        code = VecPlaceArray(s->x, x);
-    if (!code)
-        code = KSPSolve(s->direct, s->b, s->x);
-    if (!code)
-        code = KSPGetConvergedReason(s->direct, &reason);
-    VecResetArray(s->b);
-    VecResetArray(s->x);
-    return !code && reason > 0;
-}
-
 static drape_status solve(void *state, const double *b, double *x)
 {
     mpi_linear *s = state;
+    KSPConvergedReason reason = 0;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
-    bool finite = apply(s, b, x);
+    const bool failed = VecPlaceArray(s->b, b) || VecPlaceArray(s->x, x) || KSPSolve(s->direct, s->b, s->x) ||
+                        KSPGetConvergedReason(s->direct, &reason);
+    VecResetArray(s->b);
+    VecResetArray(s->x);
+    bool finite = !failed && reason > 0;
     for (int64_t i = 0; i < 3 * (int64_t)s->pattern->ranks->own_blocks && finite; i++)
         finite = isfinite(x[i]);
     return drape_ranks_all(s->pattern->ranks, finite) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
@@ -285,29 +205,14 @@ static bool solves(mpi_linear *s)
 {
     Vec b = NULL, x = NULL, left = NULL;
     PetscReal a = 0, length = 0, right = 0, error = INFINITY;
-    PetscErrorCode code = MatCreateVecs(s->matrix, &x, &b);
-    if (!code)
-        code = VecDuplicate(b, &left);
-    if (!code)
-        code = VecSetRandom(b, NULL);
-    if (!code)
-        code = KSPSolve(s->direct, b, x);
-    if (!code)
-        code = MatMult(s->matrix, x, left);
-    if (!code)
-        code = VecAXPY(left, -1, b);
-    if (!code)
-        code = VecNorm(left, NORM_INFINITY, &error);
-    if (!code)
-        code = VecNorm(x, NORM_INFINITY, &length);
-    if (!code)
-        code = VecNorm(b, NORM_INFINITY, &right);
-    if (!code)
-        code = MatNorm(s->matrix, NORM_INFINITY, &a);
+    const bool failed = MatCreateVecs(s->matrix, &x, &b) || VecDuplicate(b, &left) || VecSetRandom(b, NULL) ||
+                        KSPSolve(s->direct, b, x) || MatMult(s->matrix, x, left) || VecAXPY(left, -1, b) ||
+                        VecNorm(left, NORM_INFINITY, &error) || VecNorm(x, NORM_INFINITY, &length) ||
+                        VecNorm(b, NORM_INFINITY, &right) || MatNorm(s->matrix, NORM_INFINITY, &a);
     VecDestroy(&b);
     VecDestroy(&x);
     VecDestroy(&left);
-    return drape_ranks_all(s->pattern->ranks, !code && error < INERTIA_ERROR * (a * length + right));
+    return drape_ranks_all(s->pattern->ranks, !failed && error < INERTIA_ERROR * (a * length + right));
 }
 
 drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *p, const double *values,

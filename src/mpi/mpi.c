@@ -2,7 +2,6 @@
 #include "mpi/mpi.h"
 
 #include "mpi/part.h"
-#include "mpi/partition.h"
 
 #include <petscsys.h>
 #include <stdlib.h>
@@ -30,18 +29,6 @@ static PetscErrorCode keep_quiet(MPI_Comm comm, int line, const char *function, 
     return code;
 }
 
-static drape_status begin_petsc(drape_context *ctx)
-{
-    PetscErrorCode code = PetscOptionsSetValue(NULL, "-no_signal_handler", NULL);
-    if (!code)
-        code = PetscOptionsSetValue(NULL, "-skip_petscrc", NULL);
-    if (!code)
-        code = PetscInitializeNoArguments();
-    if (!code)
-        code = PetscPushErrorHandler(keep_quiet, NULL);
-    return code ? drape_fail(ctx, DRAPE_E_SOLVER, "PETSc cannot start: code %d", (int)code) : DRAPE_OK;
-}
-
 drape_status drape_mpi_begin(drape_context *ctx, drape_mpi **out)
 {
     int count = 1, provided;
@@ -54,13 +41,16 @@ drape_status drape_mpi_begin(drape_context *ctx, drape_mpi **out)
         return DRAPE_OK;
     }
     drape_mpi *mpi = drape_alloc(ctx, 1, sizeof *mpi);
-    drape_status status = mpi ? begin_petsc(ctx) : DRAPE_E_MEMORY;
-    if (!status) {
-        mpi->ctx = ctx;
-        status = drape_mpi_ranks_create(ctx, PETSC_COMM_WORLD, &mpi->ranks);
-    }
     *out = mpi;
-    return status;
+    if (!mpi)
+        return DRAPE_E_MEMORY;
+    PetscErrorCode code;
+    if ((code = PetscOptionsSetValue(NULL, "-no_signal_handler", NULL)) ||
+        (code = PetscOptionsSetValue(NULL, "-skip_petscrc", NULL)) || (code = PetscInitializeNoArguments()) ||
+        (code = PetscPushErrorHandler(keep_quiet, NULL)))
+        return drape_fail(ctx, DRAPE_E_SOLVER, "PETSc cannot start: code %d", (int)code);
+    mpi->ctx = ctx;
+    return drape_mpi_ranks_create(ctx, PETSC_COMM_WORLD, &mpi->ranks);
 }
 
 void drape_mpi_end(drape_mpi **out)

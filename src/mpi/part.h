@@ -9,6 +9,11 @@
 
 #include "mpi/ranks.h"
 
+/* owner (node_count): the rank of each node; the same on all ranks, and each rank owns a free node: parts of equal
+ * numbers of nodes, with few edges between them. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (there are fewer free
+ * nodes than ranks). */
+drape_status drape_partition(const drape_mpi_ranks *ranks, const drape_model *whole, int32_t *owner);
+
 /* Refuses, in one line, a model with something that a part cannot have. Errors: DRAPE_E_ARGUMENT. */
 drape_status drape_part_check(const drape_model *whole);
 

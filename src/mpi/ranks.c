@@ -2,16 +2,8 @@
  * same bits. */
 #include "mpi/ranks.h"
 
-#include "mpi/file.h"
-#include "mpi/linear.h"
-
 #include <nvector/nvector_parallel.h>
 #include <string.h>
-
-static drape_mpi_ranks *of(const drape_ranks *ranks)
-{
-    return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
-}
 
 /* ---- Sums ---- */
 
@@ -22,7 +14,7 @@ static void gather(drape_mpi_ranks *r, const double *values, int n)
 
 static void sum(const drape_ranks *ranks, double *values, int n)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
         const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
         gather(r, values + first, count);
@@ -36,7 +28,7 @@ static void sum(const drape_ranks *ranks, double *values, int n)
 
 static void largest(const drape_ranks *ranks, double *values, int n)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
         const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
         gather(r, values + first, count);
@@ -51,7 +43,7 @@ static void largest(const drape_ranks *ranks, double *values, int n)
 
 static void broadcast(const drape_ranks *ranks, int from, void *bytes, int size)
 {
-    MPI_Bcast(bytes, size, MPI_BYTE, from, of(ranks)->comm);
+    MPI_Bcast(bytes, size, MPI_BYTE, from, drape_mpi_ranks_of(ranks)->comm);
 }
 
 /* ---- Copies ---- */
@@ -62,14 +54,6 @@ static void pack(const char *const *arrays, int count, const int32_t *place, int
     for (int32_t i = 0; i < n; i++)
         for (int a = 0; a < count; a++, to += size)
             memcpy(to, arrays[a] + size * (size_t)place[i], size);
-}
-
-static void unpack(const char *from, const int32_t *place, int32_t n, size_t size, int count,
-                   char *const *arrays)
-{
-    for (int32_t i = 0; i < n; i++)
-        for (int a = 0; a < count; a++, from += size)
-            memcpy(arrays[a] + size * (size_t)place[i], from, size);
 }
 
 /* Sends items to the neighbours and receives others of the same size. */
@@ -92,13 +76,16 @@ static void exchange(const drape_mpi_ranks *r, const drape_exchange *x, const ch
 {
     pack(own, count, x->out, x->first_out[x->neighbour_count], size, x->outside);
     send(r, x, x->outside, x->first_out, x->inside, x->first_in, size * (size_t)count);
-    unpack(x->inside, x->in, x->first_in[x->neighbour_count], size, count, copies);
+    const char *from = x->inside;
+    for (int32_t i = 0; i < x->first_in[x->neighbour_count]; i++)
+        for (int a = 0; a < count; a++, from += size)
+            memcpy(copies[a] + size * (size_t)x->in[i], from, size);
 }
 
 static void copy(const drape_ranks *ranks, const drape_exchange *x, const void *own, void *copies,
                  size_t size)
 {
-    exchange(of(ranks), x, &(const char *){own}, &(char *){copies}, 1, size);
+    exchange(drape_mpi_ranks_of(ranks), x, &(const char *){own}, &(char *){copies}, 1, size);
 }
 
 static void add(const drape_ranks *ranks, const drape_exchange *x, double *own, const double *copies,
@@ -106,7 +93,7 @@ static void add(const drape_ranks *ranks, const drape_exchange *x, double *own, 
 {
     const size_t n = (size_t)width, size = n * sizeof *own;
     pack(&(const char *){(const char *)copies}, 1, x->in, x->first_in[x->neighbour_count], size, x->inside);
-    send(of(ranks), x, x->inside, x->first_in, x->outside, x->first_out, size);
+    send(drape_mpi_ranks_of(ranks), x, x->inside, x->first_in, x->outside, x->first_out, size);
     for (int32_t i = 0; i < x->first_out[x->neighbour_count]; i++) {
         const double *from = (const double *)(const void *)x->outside + n * (size_t)i;
         double *to = own + n * (size_t)x->out[i];
@@ -122,18 +109,19 @@ static void fetch(const drape_ranks *ranks, double *const *nodes, int arrays)
         const int count = arrays - first < DRAPE_MPI_ARRAYS ? arrays - first : DRAPE_MPI_ARRAYS;
         for (int a = 0; a < count; a++)
             bytes[a] = (char *)nodes[first + a];
-        exchange(of(ranks), of(ranks)->nodes, (const char *const *)bytes, bytes, count, 3 * sizeof **nodes);
+        exchange(drape_mpi_ranks_of(ranks), drape_mpi_ranks_of(ranks)->nodes, (const char *const *)bytes,
+                 bytes, count, 3 * sizeof **nodes);
     }
 }
 
 static void fetch_blocks(const drape_ranks *ranks, double *blocks)
 {
-    copy(ranks, of(ranks)->blocks, blocks, blocks, 3 * sizeof *blocks);
+    copy(ranks, drape_mpi_ranks_of(ranks)->blocks, blocks, blocks, 3 * sizeof *blocks);
 }
 
 static void share(const drape_ranks *ranks, void *all, const int32_t *first, size_t size)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     for (int k = 0; k < ranks->count; k++) {
         r->places[k] = (int)size * first[k];
         r->bytes[k] = (int)size * (first[k + 1] - first[k]);
@@ -172,7 +160,7 @@ static int32_t send_piece(drape_mpi_ranks *r, const drape_rows *rows, int32_t *f
 /* In pieces, so that little is in memory twice; an empty piece is the last of a rank. */
 static void collect(const drape_ranks *ranks, const drape_rows *rows, double *all)
 {
-    drape_mpi_ranks *r = of(ranks);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     int32_t first = 0;
     while (send_piece(r, rows, &first, all) > 0)
         ;
@@ -191,21 +179,11 @@ static void collect(const drape_ranks *ranks, const drape_rows *rows, double *al
 static void *vector(const drape_ranks *ranks, int64_t n, double *values, void *sun)
 {
     const int64_t all = n / ranks->own_blocks * ranks->all_blocks; /* some numbers for each block */
-    return values ? N_VMake_Parallel(of(ranks)->comm, n, all, values, sun)
-                  : N_VNew_Parallel(of(ranks)->comm, n, all, sun);
+    return values ? N_VMake_Parallel(drape_mpi_ranks_of(ranks)->comm, n, all, values, sun)
+                  : N_VNew_Parallel(drape_mpi_ranks_of(ranks)->comm, n, all, sun);
 }
 
 /* ---- Plans ---- */
-
-static int32_t find(const int32_t *sorted, int32_t count, int32_t value)
-{
-    int32_t low = 0, high = count;
-    while (high - low > 1) {
-        const int32_t middle = (low + high) / 2;
-        *(sorted[middle] <= value ? &low : &high) = middle;
-    }
-    return low;
-}
 
 /* wanted (ranks): how many items of each rank have copies here; asked (ranks): of this one there. */
 static drape_exchange *take(drape_arena *arena, int ranks, const int *wanted, const int *asked,
@@ -241,25 +219,10 @@ static drape_exchange *take(drape_arena *arena, int ranks, const int *wanted, co
     return x;
 }
 
-/* Asks the owners of the copies for them, whose places they get. */
-static void ask(const drape_mpi_ranks *r, drape_exchange *x, int32_t count, const int32_t *rank,
-                const int32_t *place, int32_t *asked)
-{
-    for (int k = 0; k < x->neighbour_count; k++) {
-        int32_t to = x->first_in[k];
-        for (int32_t i = 0; i < count; i++)
-            if (rank[i] == x->neighbour[k]) {
-                x->in[to] = i;
-                asked[to++] = place[i];
-            }
-    }
-    send(r, x, (const char *)asked, x->first_in, (char *)x->out, x->first_out, sizeof *asked);
-}
-
 static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_t count, const int32_t *rank,
                             const int32_t *place, size_t largest)
 {
-    const drape_mpi_ranks *r = of(ranks);
+    const drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
     drape_arena scratch = drape_arena_of(arena->ctx);
     drape_exchange *x = NULL;
     int *wanted = drape_arena_take(&scratch, (size_t)ranks->count, sizeof *wanted),
@@ -273,8 +236,17 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
         x = take(arena, ranks->count, wanted, asked, largest);
         status = drape_ranks_agree_memory(ranks, arena->ctx, x);
     }
-    if (!status)
-        ask(r, x, count, rank, place, places);
+    if (!status) { /* asks the owners of the copies for them, whose places they get */
+        for (int k = 0; k < x->neighbour_count; k++) {
+            int32_t to = x->first_in[k];
+            for (int32_t i = 0; i < count; i++)
+                if (rank[i] == x->neighbour[k]) {
+                    x->in[to] = i;
+                    places[to++] = place[i];
+                }
+        }
+        send(r, x, (const char *)places, x->first_in, (char *)x->out, x->first_out, sizeof *places);
+    }
     drape_arena_free(&scratch);
     return status ? NULL : x;
 }
@@ -295,8 +267,14 @@ static drape_exchange *plan_nodes(drape_mpi_ranks *r, const drape_model *m, cons
     drape_exchange *x = plan(&r->base, &r->arena, count, rank, number, 3 * DRAPE_MPI_ARRAYS * sizeof(double));
     for (int32_t i = 0; x && i < x->first_in[x->neighbour_count]; i++)
         x->in[i] = copy[x->in[i]];
-    for (int32_t i = 0; x && i < x->first_out[x->neighbour_count]; i++)
-        x->out[i] = find(node, m->node_count, x->out[i]);
+    for (int32_t i = 0; x && i < x->first_out[x->neighbour_count]; i++) {
+        int32_t low = 0, high = m->node_count; /* by bisection: nodes ascend */
+        while (high - low > 1) {
+            const int32_t middle = (low + high) / 2;
+            *(node[middle] <= x->out[i] ? &low : &high) = middle;
+        }
+        x->out[i] = low;
+    }
     return x;
 }
 

@@ -3,6 +3,7 @@
 #define DRAPE_MPI_RANKS_H
 
 #include "model/model.h"
+#include "solvers/linear.h"
 
 #include <mpi.h>
 
@@ -31,6 +32,11 @@ typedef struct drape_mpi_ranks {
     int32_t *numbers;    /* (DRAPE_MPI_PIECE) of its items */
 } drape_mpi_ranks;
 
+static inline drape_mpi_ranks *drape_mpi_ranks_of(const drape_ranks *ranks)
+{
+    return (drape_mpi_ranks *)(uintptr_t)ranks; /* base is its first member */
+}
+
 /* The ranks of a communicator, which becomes theirs. Errors: DRAPE_E_MEMORY. */
 drape_status drape_mpi_ranks_create(drape_context *ctx, MPI_Comm comm, drape_mpi_ranks **out);
 void drape_mpi_ranks_destroy(drape_mpi_ranks **ranks);
@@ -38,5 +44,24 @@ void drape_mpi_ranks_destroy(drape_mpi_ranks **ranks);
 /* Plans the exchange of copies for a part of a model; owner: of the nodes of the whole model. Collective.
  * Errors: DRAPE_E_MEMORY. */
 drape_status drape_mpi_ranks_plan(drape_mpi_ranks *ranks, const drape_model *part, const int32_t *owner);
+
+/* ---- file.c: arrays of which each rank has some items, written by all ranks into one file ---- */
+
+/* drape_ranks.open, write and close. */
+int drape_mpi_open(const drape_ranks *ranks, const char *path);
+int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian, const drape_rows *rows,
+                    uint64_t *sum);
+int drape_mpi_close(const drape_ranks *ranks, bool durable);
+
+/* ---- linear.c: the direct solver of a matrix that ranks share (pattern->ranks) ---- */
+
+/* It is not in the table of linear solvers, as no scene names it: a run on several ranks has it in place of direct
+ * ones (drape_linear_of). */
+extern const drape_linear_ops drape_linear_mpi_direct;
+
+/* drape_ranks.inertia: the signs of the pivots of MUMPS. *known: also false if the matrix is not
+ * symmetric. */
+drape_status drape_mpi_inertia(drape_context *ctx, const drape_pattern *pattern, const double *values,
+                               int64_t *negative, bool *known);
 
 #endif
