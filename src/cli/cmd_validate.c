@@ -2,7 +2,7 @@
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
-#include "lab/record.h"
+#include "lab/validate.h"
 
 #include "base/clock.h"
 #include "io/export.h"

@@ -94,10 +94,6 @@ drape_status lab_ivp_export(const lab_ivp *s, const char *folder, FILE *out);
 
 /* ---- For the files of the set ---- */
 
-/* The frames (time_count x nodes x 3) in the bytes of an NPY file, which are in the arena, with the start
- * before them or without; frees the bytes. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
-drape_status lab_ivp_take_frames(const lab_ivp *s, const char *path, char *bytes, size_t size, double **x);
-
 /* "DIR/KIND/NAME.ENDING" in the arena; NULL: out of memory. */
 char *lab_ivp_file(const lab_ivp *s, const char *kind, const char *ending);
 

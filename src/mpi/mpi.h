@@ -1,6 +1,6 @@
 /*
  * mpi.h: a run on several ranks, as the program drives it. Each rank compiles the scene, keeps its part of
- * the model (part.h), and steps it with the code of one process; base/ranks.h has what that code
+ * the model, and steps it with the code of one process; base/ranks.h has what that code
  * exchanges.
  */
 #ifndef DRAPE_MPI_MPI_H
@@ -19,8 +19,6 @@ bool drape_mpi_is_launched(void);
 drape_status drape_mpi_begin(drape_context *ctx, drape_mpi **out);
 /* Ends them; collective. */
 void drape_mpi_end(drape_mpi **mpi);
-/* Ends the processes of all ranks at once, with this exit code, after a failure that only this one has. */
-void drape_mpi_abort(int code);
 
 int drape_mpi_rank(const drape_mpi *mpi);
 int drape_mpi_count(const drape_mpi *mpi);
