@@ -305,21 +305,12 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
         "through the filled markers");
 }
 
-static void write_table(lab *l, const sequence *s)
-{
-    const lab_table t = {.l = l};
-    lab_table_begin(&t, s->series, "%s\tmoved [m]\torder", s->knob);
-    for (size_t i = 0; i < s->count; i++)
-        lab_table_row(&t, i > 0 && !s->unrefined ? "%.6g\t%.4g\t%.3f" : "%.6g\t%.4g\t", s->value[i],
-                      s->moved[i], i > 0 ? local_order(s, i) : NAN);
-    lab_table_end(&t);
-}
-
 static drape_status report(lab *l)
 {
     static const struct {
         const char *knob, *label;
     } knobs[] = {{"dt", "dt [s]"}, {"rtol", "rtol"}, {"edge", "edge length / that of the coarsest mesh"}};
+    const lab_table t = {.l = l};
     size_t count = 0;
     const lab_series *series = lab_list_series(l, NULL, &count);
     sequence *sequences = drape_arena_take(&l->arena, count, sizeof *sequences);
@@ -332,8 +323,13 @@ static drape_status report(lab *l)
     drape_status status = DRAPE_OK;
     for (size_t i = 0; i < sizeof knobs / sizeof *knobs && !status; i++)
         status = draw(l, sequences, count, knobs[i].knob, knobs[i].label);
-    for (size_t k = 0; k < count; k++)
-        write_table(l, &sequences[k]);
+    for (const sequence *s = sequences; s < sequences + count; s++) {
+        lab_table_begin(&t, s->series, "%s\tmoved [m]\torder", s->knob);
+        for (size_t i = 0; i < s->count; i++)
+            lab_table_row(&t, i > 0 && !s->unrefined ? "%.6g\t%.4g\t%.3f" : "%.6g\t%.4g\t", s->value[i],
+                          s->moved[i], i > 0 ? local_order(s, i) : NAN);
+        lab_table_end(&t);
+    }
     return status;
 }
 

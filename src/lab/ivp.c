@@ -401,25 +401,6 @@ static drape_status draw_horizons(const tables *all)
 
 /* ---- The report ---- */
 
-static drape_status tabulate(tables *all)
-{
-    char *text = NULL;
-    size_t size = 0;
-    lab *l = all->table.l;
-    FILE *out = all->table.markdown = open_memstream(&text, &size);
-    if (!out)
-        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for tables.md");
-    tabulate_scenes(all);
-    tabulate_cheapest(all);
-    tabulate_orders(all);
-    tabulate_failures(all);
-    fclose(out);
-    fprintf(l->summary, "%s\n", text);
-    drape_status status = lab_write_text(l, "tables.md", text, size);
-    free(text);
-    return status;
-}
-
 static drape_status report(lab *l)
 {
     const json_t *abouts = json_object_get(l->arguments, "scenes");
@@ -436,7 +417,22 @@ static drape_status report(lab *l)
         status = draw_horizons(&all);
     for (size_t i = 0; !status && i < count; i++)
         status = draw(l, &scenes[i]);
-    return status ? status : tabulate(&all);
+    if (status)
+        return status;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = all.table.markdown = open_memstream(&text, &size);
+    if (!out)
+        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for tables.md");
+    tabulate_scenes(&all);
+    tabulate_cheapest(&all);
+    tabulate_orders(&all);
+    tabulate_failures(&all);
+    fclose(out);
+    fprintf(l->summary, "%s\n", text);
+    status = lab_write_text(l, "tables.md", text, size);
+    free(text);
+    return status;
 }
 
 const lab_experiment_ops lab_experiment_ivp = {

@@ -155,22 +155,6 @@ static drape_status refine(const lab_ivp *s, double seconds, const attempt *atte
 
 /* ---- The choice ---- */
 
-static json_t *describe(const lab_ivp *s, const attempt *attempts, int count, const attempt *best)
-{
-    json_t *methods = json_array();
-    for (int i = 0; i < count; i++) {
-        const attempt *a = &attempts[i];
-        methods = drape_json_append(
-            methods,
-            json_pack("{s:s, s:s, s:s, s:f, s:i, s:i, s:o, s:o}", "family", a->family->name, "method",
-                      a->family->method, "knob", a->family->rtol > 0 ? "rtol" : "dt_s", "value", a->knob,
-                      "levels", a->count, "extrapolated", a->column, "change", drape_json_number(a->change),
-                      "distance",
-                      drape_json_number(a->count ? lab_ivp_distance(s, &a->best, &best->best) : NAN)));
-    }
-    return methods;
-}
-
 static drape_status store(const lab_ivp *s, const attempt *attempts, int count, const attempt *best,
                           double error)
 {
@@ -187,7 +171,18 @@ static drape_status store(const lab_ivp *s, const attempt *attempts, int count, 
     about = drape_json_with(about, "error", json_real(error));
     about = drape_json_with(about, "method", json_string(best->family->method));
     about = drape_json_with(about, "data_hash", json_string(digits));
-    about = drape_json_with(about, "methods", describe(s, attempts, count, best));
+    json_t *methods = json_array();
+    for (int i = 0; i < count; i++) {
+        const attempt *a = &attempts[i];
+        methods = drape_json_append(
+            methods,
+            json_pack("{s:s, s:s, s:s, s:f, s:i, s:i, s:o, s:o}", "family", a->family->name, "method",
+                      a->family->method, "knob", a->family->rtol > 0 ? "rtol" : "dt_s", "value", a->knob,
+                      "levels", a->count, "extrapolated", a->column, "change", drape_json_number(a->change),
+                      "distance",
+                      drape_json_number(a->count ? lab_ivp_distance(s, &a->best, &best->best) : NAN)));
+    }
+    about = drape_json_with(about, "methods", methods);
     drape_status status = lab_ivp_write(s, data, header, sizeof header, best->best.x, size);
     if (!status)
         status = lab_ivp_write_json(s, path, about);

@@ -23,23 +23,6 @@
 
 /* ---- Scenes ---- */
 
-static drape_status make_times(lab_ivp *s)
-{
-    const double duration = drape_model_duration(s->model), rate = drape_model_frame_rate(s->model);
-    const double count = round(duration * rate);
-    if (!(fabs(duration * rate - count) < 1e-9 * count) || count < 2 || count > MOST_TIMES)
-        return drape_fail(s->arena->ctx, DRAPE_E_ARGUMENT,
-                          "%.300s: duration %g s times frame_rate %g/s must be a whole number, 2 to %d: the "
-                          "frames are the times of the reference",
-                          s->path, duration, rate, MOST_TIMES);
-    s->time_count = (size_t)count;
-    s->interval = duration / count;
-    s->times = drape_arena_take(s->arena, s->time_count, sizeof *s->times);
-    for (size_t i = 0; s->times && i < s->time_count; i++)
-        s->times[i] = i + 1 == s->time_count ? duration : (double)(i + 1) / rate;
-    return s->times ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
 drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
 {
     char *name;
@@ -75,7 +58,19 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
                 "%.300s: /events/%d/action: must be \"record\": a reference is of a motion that "
                 "nothing ends or changes",
                 path, (int)i);
-    return make_times(s);
+    const double duration = drape_model_duration(s->model), rate = drape_model_frame_rate(s->model);
+    const double count = round(duration * rate);
+    if (!(fabs(duration * rate - count) < 1e-9 * count) || count < 2 || count > MOST_TIMES)
+        return drape_fail(s->arena->ctx, DRAPE_E_ARGUMENT,
+                          "%.300s: duration %g s times frame_rate %g/s must be a whole number, 2 to %d: the "
+                          "frames are the times of the reference",
+                          s->path, duration, rate, MOST_TIMES);
+    s->time_count = (size_t)count;
+    s->interval = duration / count;
+    s->times = drape_arena_take(s->arena, s->time_count, sizeof *s->times);
+    for (size_t i = 0; s->times && i < s->time_count; i++)
+        s->times[i] = i + 1 == s->time_count ? duration : (double)(i + 1) / rate;
+    return s->times ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 void lab_ivp_close(lab_ivp *s)

@@ -303,25 +303,6 @@ static double backward_error(problem *p, double value, const double *u)
     return scale > 0 ? largest / scale : INFINITY;
 }
 
-/* For OP symmetric in B there is an eigenvalue within |OP u - op u| of op, in the norm of B with |u| = 1.
- * *error: relative to op. */
-static drape_status inverse_error(problem *p, const eigenpair *pair, double *error)
-{
-    const double *u = p->vector + (int64_t)pair->vector * p->n;
-    double *y = drape_arena_take(&p->arena, 2 * (size_t)p->n, sizeof *y), sum = 0;
-    drape_status status = y ? apply(p, u, y) : DRAPE_E_MEMORY;
-    if (!status) {
-        for (int64_t i = 0; i < p->n; i++)
-            y[i] -= pair->op * u[i];
-        inner(p, y, y + p->n);
-        for (int64_t i = 0; i < p->n; i++)
-            sum += y[i] * y[p->n + i];
-        *error = sqrt(fmax(0, sum)) / pair->op;
-    }
-    drape_arena_release(&p->arena, y);
-    return status;
-}
-
 /* The nodes of a shape, with a largest displacement of 1 whose largest component is positive; returns the
  * scale. */
 static double fill_shape(const problem *p, const double *u, double *shape)
@@ -352,7 +333,19 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
     const double *u = p->vector + (int64_t)pair->vector * p->n;
     double inverse = 0, mass = 0;
     mode->value = p->shift + 1 / pair->op;
-    drape_status status = inverse_error(p, pair, &inverse);
+    /* For OP symmetric in B there is an eigenvalue within |OP u - op u| of op, in the norm of B with |u| = 1;
+     * inverse: relative to op. */
+    double *y = drape_arena_take(&p->arena, 2 * (size_t)p->n, sizeof *y), sum = 0;
+    drape_status status = y ? apply(p, u, y) : DRAPE_E_MEMORY;
+    if (!status) {
+        for (int64_t i = 0; i < p->n; i++)
+            y[i] -= pair->op * u[i];
+        inner(p, y, y + p->n);
+        for (int64_t i = 0; i < p->n; i++)
+            sum += y[i] * y[p->n + i];
+        inverse = sqrt(fmax(0, sum)) / pair->op;
+    }
+    drape_arena_release(&p->arena, y);
     if (status)
         return status;
     for (int64_t i = 0; i < p->n; i++)

@@ -226,22 +226,6 @@ static drape_status open_step(follower *p)
     return factor(p);
 }
 
-/* The prediction of a step of that length: of the factor under load control, else of the arc. It goes on in
- * the direction of the last step; the first one towards `to`. */
-static void predict(follower *p, double length)
-{
-    double change = length;
-    if (!p->def->load_control) {
-        const double size = norm(p, p->b);
-        change = (p->moved ? dot(p, p->before, p->b) : p->def->to - p->def->from) < 0 ? -length / size
-                                                                                      : length / size;
-    } else if (p->def->to < p->def->from)
-        change = -length;
-    for (size_t i = 0; i < p->n; i++)
-        p->step[i] = change * p->b[i];
-    p->change = p->direction = change;
-}
-
 static double limit_of(const follower *p)
 {
     return MAX_CORRECTION * norm(p, p->step);
@@ -253,7 +237,17 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
     drape_status status = open_step(p);
     if (status)
         return status;
-    predict(p, length);
+    /* The prediction of a step of that length: of the factor under load control, else of the arc. It goes
+     * on in the direction of the last step; the first one towards `to`. */
+    double change = length;
+    if (!p->def->load_control) {
+        change /= norm(p, p->b);
+        change *= (p->moved ? dot(p, p->before, p->b) : p->def->to - p->def->from) < 0 ? -1 : 1;
+    } else if (p->def->to < p->def->from)
+        change = -length;
+    for (size_t i = 0; i < p->n; i++)
+        p->step[i] = change * p->b[i];
+    p->change = p->direction = change;
     memcpy(p->ahead, p->step, p->n * sizeof *p->step);
     status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
     /* A step that has left the direction of its prediction has found another part of the path, such as the

@@ -4,8 +4,7 @@
 
 #include <math.h>
 
-#define SIDE      0.1    /* [m] */
-#define STIFFNESS 1000.0 /* E h [N/m] */
+#define SIDE 0.1 /* [m] */
 
 /* The strip along x. */
 #define PULLED                                                                                               \

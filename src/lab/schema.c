@@ -1,6 +1,7 @@
 /* schema.c: see lab.h, which has the form of both files. */
 #include "lab/lab.h"
 
+#include <stdarg.h>
 #include <string.h>
 
 #define LONGEST    DRAPE_MESSAGE_SIZE /* of texts that are shown */
@@ -23,10 +24,15 @@ static drape_status refuse(const place *at, const char *name, const char *why)
                       name, why);
 }
 
-/* The result of json_unpack_ex, whose format says which members an object has, and of which types. */
-static drape_status unpacked(const place *at, int code, const json_error_t *fault)
+/* The format, as of json_unpack, says which members an object has, and of which types. */
+static drape_status check_form(const place *at, json_t *object, const char *format, ...)
 {
-    return code ? refuse(at, "", fault->text) : DRAPE_OK;
+    json_error_t fault;
+    va_list keys;
+    va_start(keys, format);
+    const int code = json_vunpack_ex(object, &fault, JSON_VALIDATE_ONLY, format, keys);
+    va_end(keys);
+    return code ? refuse(at, "", fault.text) : DRAPE_OK;
 }
 
 /* The members of an object, scalars but for some. Texts are shown, or become part of the name of a file. */
@@ -84,15 +90,11 @@ static drape_status check_order(const place *at, const json_t *cases, size_t i, 
 static drape_status check_cases(place *at, const json_t *cases)
 {
     json_t *series = json_object(), *one;
-    json_error_t fault;
     drape_status status = json_array_size(cases) ? DRAPE_OK : refuse(at, "cases", "there is none");
     for (size_t i = 0; !status && (one = json_array_get(cases, i)); i++) {
         snprintf(at->pointer, sizeof at->pointer, "/cases/%zu", i);
-        status = unpacked(
-            at,
-            json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:{s:s, s?:s, s?:s, s?:s}, s?:{}, s?:I, s?:I}",
-                           "tags", "integrator", "scene", "series", "knob", "settings", "same_as", "rank"),
-            &fault);
+        status = check_form(at, one, "{s:{s:s, s?:s, s?:s, s?:s}, s?:{}, s?:I, s?:I}", "tags", "integrator",
+                            "scene", "series", "knob", "settings", "same_as", "rank");
         if (!status)
             status = check_members(at, json_object_get(one, "tags"), (const char *const[]){NULL});
         if (!status)
@@ -105,15 +107,12 @@ static drape_status check_cases(place *at, const json_t *cases)
 static drape_status check_scenes(place *at, const json_t *scenes)
 {
     json_t *one;
-    json_error_t fault;
     drape_status status =
         json_array_size(scenes) <= MAX_SCENES ? DRAPE_OK : refuse(at, "arguments/scenes", "more than 256");
     for (size_t i = 0; !status && (one = json_array_get(scenes, i)); i++) {
         snprintf(at->pointer, sizeof at->pointer, "/arguments/scenes/%zu", i);
-        status = unpacked(at,
-                          json_unpack_ex(one, &fault, JSON_VALIDATE_ONLY, "{s:s, s:F, s:F, s?:[], s?:[]}",
-                                         "name", "duration_s", "reference_error", "t_s", "growth"),
-                          &fault);
+        status = check_form(at, one, "{s:s, s:F, s:F, s?:[], s?:[]}", "name", "duration_s", "reference_error",
+                            "t_s", "growth");
         if (!status)
             status = check_members(at, one, (const char *const[]){"t_s", "growth", NULL});
         if (!status)
@@ -126,14 +125,10 @@ static drape_status check_scenes(place *at, const json_t *scenes)
 
 drape_status lab_check_about(drape_context *ctx, const char *file, json_t *about)
 {
-    json_error_t fault;
     place at = {ctx, file, ""};
     const json_t *arguments = json_object_get(about, "arguments");
-    drape_status status = unpacked(
-        &at,
-        json_unpack_ex(about, &fault, JSON_VALIDATE_ONLY, "{s:s, s:{s?:[], s?:[]}, s:[], s?:[], s?:[]}",
-                       "experiment", "arguments", "axes", "scenes", "cases", "results", "settings"),
-        &fault);
+    drape_status status = check_form(&at, about, "{s:s, s:{s?:[], s?:[]}, s:[], s?:[], s?:[]}", "experiment",
+                                     "arguments", "axes", "scenes", "cases", "results", "settings");
     if (!status)
         status = check_items(&at, arguments, "axes", true);
     if (!status)

@@ -229,24 +229,6 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     return lab_add_case(l, tags, settings, repeated ? (int64_t)same : -1);
 }
 
-/* Before hours are spent, checks that the scene compiles at both ends of every axis and one step inside, as
- * an axis with integer ends may have fractions between. */
-static drape_status try_ends(lab *l, size_t first, const space *s)
-{
-    size_t inside = 0, stride = 1;
-    drape_status status = DRAPE_OK;
-    for (int a = 0; a < s->count; a++) {
-        inside += stride;
-        stride *= (size_t)s->axes[a].count;
-    }
-    const size_t cells[] = {0, inside, s->cells - 1};
-    for (size_t i = 0; i < sizeof cells / sizeof *cells && !status; i++) {
-        const lab_request request = lab_request_of(l, first + cells[i]);
-        status = lab_try(l->ctx, &request);
-    }
-    return status;
-}
-
 static drape_status plan(lab *l)
 {
     static const char *const defaults[] = {"be", "bdf2", "ida", "verlet", NULL};
@@ -272,6 +254,9 @@ static drape_status plan(lab *l)
     }
     if (!status && def->result_count == 0 && s.count == 1)
         json_array_append_new(results, json_string("energy_drift"));
+    size_t inside = 0, stride = 1;
+    for (int a = 0; !status && a < s.count; stride *= (size_t)s.axes[a++].count)
+        inside += stride;
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *integrator = drape_integrators[i];
         const size_t first = json_array_size(l->cases);
@@ -279,8 +264,13 @@ static drape_status plan(lab *l)
             continue;
         for (size_t cell = 0; cell < s.cells && !status; cell++)
             status = add_cell(l, &s, integrator, cell, first);
-        if (!status)
-            status = try_ends(l, first, &s);
+        /* Before hours are spent, checks that the scene compiles at both ends of every axis and one step inside, as
+         * an axis with integer ends may have fractions between. */
+        const size_t cells[] = {0, inside, s.cells - 1};
+        for (size_t k = 0; k < sizeof cells / sizeof *cells && !status; k++) {
+            const lab_request request = lab_request_of(l, first + cells[k]);
+            status = lab_try(l->ctx, &request);
+        }
     }
     return status;
 }

@@ -217,32 +217,26 @@ double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor
     return largest;
 }
 
-/* The largest change of an edge along u, in parts of its length: of its length or of its direction. */
-static double largest_change(const lab_tangent *t, const double *u)
+drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *values)
 {
+    const size_t count = (size_t)t->pattern->nonzeros;
+    /* The largest change of an edge along u, in parts of its length: of its length or of its direction. */
     const drape_model *m = t->sim->model;
-    const double *x = drape_sim_state(t->sim)->x;
-    double largest = 0;
+    const double *now = drape_sim_state(t->sim)->x;
+    double change = 0;
     for (int32_t e = 0; e < m->edge_count; e++) {
         double moved = 0, length = 0;
         const int32_t a = m->edge[2 * e], b = m->edge[2 * e + 1];
         const int32_t fa = m->free_of_node[a], fb = m->free_of_node[b];
         for (int k = 0; k < 3; k++) {
             const double d = (fa < 0 ? 0 : u[3 * fa + k]) - (fb < 0 ? 0 : u[3 * fb + k]);
-            const double l = x[3 * (size_t)a + (size_t)k] - x[3 * (size_t)b + (size_t)k];
+            const double l = now[3 * (size_t)a + (size_t)k] - now[3 * (size_t)b + (size_t)k];
             moved += d * d;
             length += l * l;
         }
-        largest = fmax(largest, sqrt(moved / length));
+        change = fmax(change, sqrt(moved / length));
     }
-    return largest;
-}
-
-drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *values)
-{
-    const size_t count = (size_t)t->pattern->nonzeros;
-    const double change = largest_change(t, u);
-    double *x = drape_arena_take(t->arena, 3 * (size_t)t->sim->model->node_count, sizeof *x);
+    double *x = drape_arena_take(t->arena, 3 * (size_t)m->node_count, sizeof *x);
     double *before = drape_arena_take(t->arena, count, sizeof *before);
     if (drape_arena_status(t->arena))
         return DRAPE_E_MEMORY;
@@ -252,8 +246,7 @@ drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *va
     const double h = DIFFERENCE / change;
     for (int side = -1; side <= 1; side += 2) {
         bool changed;
-        const drape_model *m = t->sim->model;
-        memcpy(x, drape_sim_state(t->sim)->x, 3 * (size_t)m->node_count * sizeof *x);
+        memcpy(x, now, 3 * (size_t)m->node_count * sizeof *x);
         for (int32_t i = 0; i < 3 * m->free_count; i++)
             x[3 * (size_t)m->node_of_free[i / 3] + (size_t)(i % 3)] += side * h * u[i];
         const drape_point point = point_at(t, x);

@@ -414,21 +414,6 @@ static void report_headline(lab *l, const lab_series *usual)
             errors[0], errors[1]);
 }
 
-/* Names the series of which too few cases were run; those without any are named among what was left out. */
-static void report_sparse(lab *l, all a)
-{
-    bool any = false;
-    for (const lab_series *s = a.series; s < a.series + a.count; s++)
-        if (s->count > 0 && s->count < FEWEST) {
-            if (!any)
-                fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
-            fprintf(l->summary, "%s %s (%zu)", any ? "," : "", s->name, s->count);
-            any = true;
-        }
-    if (any)
-        fprintf(l->summary, ".\n");
-}
-
 static void report_reference(lab *l)
 {
     double smallest = INFINITY, reference = NAN;
@@ -511,7 +496,17 @@ static drape_status report(lab *l)
     const lab_series *usual = lab_find_series(a.series, a.count, BASE_METHOD);
     drape_status status = DRAPE_OK;
     report_headline(l, usual);
-    report_sparse(l, a);
+    /* The series of which too few cases were run; those without any are named among what was left out. */
+    bool any = false;
+    for (const lab_series *s = a.series; s < a.series + a.count; s++)
+        if (s->count > 0 && s->count < FEWEST) {
+            if (!any)
+                fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
+            fprintf(l->summary, "%s %s (%zu)", any ? "," : "", s->name, s->count);
+            any = true;
+        }
+    if (any)
+        fprintf(l->summary, ".\n");
     for (int decade = 0; decade >= -7; decade--) {
         const json_t *best = cheapest(a, pow(10, decade), NULL);
         if (best && best != cheapest(a, pow(10, decade + 1), NULL))

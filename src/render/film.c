@@ -102,15 +102,13 @@ static int add_args(char *text, char **args, int count)
 static drape_status spawn(drape_film *film, char **args, int reading)
 {
     posix_spawn_file_actions_t actions;
+    const int copies[][2] = {{reading, STDIN_FILENO},
+                             {film->errors, STDOUT_FILENO},
+                             {film->errors, STDERR_FILENO},
+                             {film->file.fd, CHILD_FILE}};
     int error = posix_spawn_file_actions_init(&actions);
-    if (!error)
-        error = posix_spawn_file_actions_adddup2(&actions, reading, STDIN_FILENO);
-    if (!error)
-        error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDOUT_FILENO);
-    if (!error)
-        error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDERR_FILENO);
-    if (!error)
-        error = posix_spawn_file_actions_adddup2(&actions, film->file.fd, CHILD_FILE);
+    for (int i = 0; !error && i < 4; i++)
+        error = posix_spawn_file_actions_adddup2(&actions, copies[i][0], copies[i][1]);
     if (!error)
         error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, args, environ);
     posix_spawn_file_actions_destroy(&actions);

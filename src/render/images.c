@@ -48,7 +48,8 @@ drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const cha
     return status;
 }
 
-drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height)
+/* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. */
+static drape_status read_png(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height)
 {
     png_image image = {.version = PNG_IMAGE_VERSION};
     *pixels = NULL;
@@ -76,49 +77,13 @@ drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixe
 
 /* ---- Textures ---- */
 
-static GLuint upload(GLenum kind, int width, int height, GLenum type, const void *pixels)
-{
-    const GLuint name = drape_gl_texture(kind, width, height, GL_RGBA, type, pixels, GL_LINEAR, GL_REPEAT);
-    glGenerateMipmap(GL_TEXTURE_2D);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
-    return name;
-}
-
-/* A texture of a file, with the bottom row first, as v grows upwards. */
-static drape_status upload_file(drape_context *ctx, const char *path, GLenum kind, GLuint *out)
-{
-    uint8_t *pixels;
-    int width = 0, height = 0;
-    drape_status status = drape_png_read(ctx, path, &pixels, &width, &height);
-    if (status)
-        return status;
-    drape_gl_flip(pixels, width, height);
-    *out = upload(kind, width, height, GL_UNSIGNED_BYTE, pixels);
-    drape_free(ctx, pixels);
-    return DRAPE_OK;
-}
-
-static drape_status upload_bytes(drape_context *ctx, GLenum kind,
-                                 void (*paint)(double u, double v, uint8_t *to), GLuint *out)
-{
-    uint8_t *pixels = drape_alloc(ctx, (size_t)PATTERN * PATTERN, 4);
-    if (!pixels)
-        return DRAPE_E_MEMORY;
-    for (int j = 0; j < PATTERN; j++)
-        for (int i = 0; i < PATTERN; i++)
-            paint((i + 0.5) / PATTERN, (j + 0.5) / PATTERN, pixels + 4 * ((size_t)j * PATTERN + (size_t)i));
-    *out = upload(kind, PATTERN, PATTERN, GL_UNSIGNED_BYTE, pixels);
-    drape_free(ctx, pixels);
-    return DRAPE_OK;
-}
-
 static bool in_box(double x, double y, double x0, double y0, double x1, double y1)
 {
     return x >= x0 && x <= x1 && y >= y0 && y <= y1;
 }
 
 /* Checks with fine lines between them, and the letter in every second light check. */
-static void paint_pattern(double u, double v, uint8_t *to)
+static void paint_pattern(double u, double v, void *to)
 {
     static const uint8_t dark[] = {38, 70, 118}, light[] = {232, 226, 212}, red[] = {198, 68, 52},
                          line[] = {24, 44, 78};
@@ -133,12 +98,11 @@ static void paint_pattern(double u, double v, uint8_t *to)
              (in_box(x, y, 0.28, 0.16, 0.42, 0.84) || in_box(x, y, 0.28, 0.70, 0.74, 0.84) ||
               in_box(x, y, 0.28, 0.44, 0.64, 0.57)))
         colour = red;
-    memcpy(to, colour, 3);
-    to[3] = 255;
+    memcpy(to, (const uint8_t[]){colour[0], colour[1], colour[2], 255}, 4);
 }
 
 /* Diamonds of raised metal thread, each with a knot in its middle, over a fine weave. */
-static void paint_heights(double u, double v, uint8_t *to)
+static void paint_heights(double u, double v, void *to)
 {
     double warp = sin(PI * 2 * WEAVES * u) * cos(PI * 2 * WEAVES * v);
     double x = fabs(fmod(u * DIAMONDS, 1) - 0.5), y = fabs(fmod(v * DIAMONDS, 1) - 0.5);
@@ -147,22 +111,10 @@ static void paint_heights(double u, double v, uint8_t *to)
            dot = 1 / (1 + exp((corner - 0.10) / 0.012));
     double metal = fmin(1, band + knot + dot);
     double height = 0.22 + 0.50 * metal + 0.05 * (1 - metal) * warp;
-    to[0] = to[1] = to[2] = (uint8_t)lround(255 * fmin(1, fmax(0, height)));
-    to[3] = (uint8_t)lround(255 * fmin(1, fmax(0, 1.6 * metal - 0.3)));
+    const uint8_t grey = (uint8_t)lround(255 * fmin(1, fmax(0, height))),
+                  shine = (uint8_t)lround(255 * fmin(1, fmax(0, 1.6 * metal - 0.3)));
+    memcpy(to, (const uint8_t[]){grey, grey, grey, shine}, 4);
 }
-
-drape_status drape_texture_pattern(drape_context *ctx, const char *path, GLuint *out)
-{
-    return path ? upload_file(ctx, path, GL_SRGB8_ALPHA8, out)
-                : upload_bytes(ctx, GL_SRGB8_ALPHA8, paint_pattern, out);
-}
-
-drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint *out)
-{
-    return path ? upload_file(ctx, path, GL_RGBA8, out) : upload_bytes(ctx, GL_RGBA8, paint_heights, out);
-}
-
-/* ---- The environment ---- */
 
 static double smooth(double from, double to, double x)
 {
@@ -178,8 +130,9 @@ static double lamp(double longitude, double latitude, double at, double high, do
 }
 
 /* A tiled floor that fades with distance, walls that get lighter upwards, and three lamps. */
-static void paint_sky(double u, double v, float *to)
+static void paint_sky(double u, double v, void *to)
 {
+    float *pixel = to;
     double longitude = 2 * PI * (u - 0.5), latitude = PI * (v - 0.5), up = sin(latitude);
     double wall = 0.07 + 0.42 * pow(smooth(-0.05, 1.0, up), 1.3), floor = smooth(0.012, -0.012, up);
     double away = cos(latitude) / fmax(0.02, -up), x = away * sin(longitude), z = away * cos(longitude);
@@ -190,27 +143,45 @@ static void paint_sky(double u, double v, float *to)
                    3.2 * lamp(longitude, latitude, 1.3, 0.50, 0.14, 0.40) +
                    2.6 * lamp(longitude, latitude, 2.9, 0.34, 0.50, 0.08);
     for (int k = 0; k < 3; k++)
-        to[k] = (float)((1 - floor) * wall * 1.5 * cool[k] + floor * ground * warm[k] + lamps * warm[k]);
-    to[3] = 1;
+        pixel[k] = (float)((1 - floor) * wall * 1.5 * cool[k] + floor * ground * warm[k] + lamps * warm[k]);
+    pixel[3] = 1;
 }
 
-drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out)
+drape_status drape_texture(drape_context *ctx, drape_texture_kind kind, const char *path, GLuint *out)
 {
-    drape_status status = DRAPE_OK;
-    if (path) {
-        status = upload_file(ctx, path, GL_SRGB8_ALPHA8, out);
-    } else {
-        float *pixels = drape_alloc(ctx, (size_t)SKY * SKY / 2, 4 * sizeof *pixels);
-        if (!pixels)
-            return DRAPE_E_MEMORY;
-        for (int j = 0; j < SKY / 2; j++)
-            for (int i = 0; i < SKY; i++)
-                paint_sky((i + 0.5) / SKY, (j + 0.5) / (SKY / 2), pixels + 4 * ((size_t)j * SKY + (size_t)i));
-        *out = upload(GL_RGBA16F, SKY, SKY / 2, GL_FLOAT, pixels);
-        drape_free(ctx, pixels);
-    }
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    return status;
+    static const struct {
+        void (*paint)(double u, double v, void *to);
+        int width, height;
+        size_t bytes;        /* of a pixel */
+        GLenum type, format; /* of the built-in one */
+        GLenum of_file;      /* the format of one from a file */
+        GLint wrap;          /* along v */
+    } kinds[] = {
+        {paint_pattern, PATTERN, PATTERN, 4, GL_UNSIGNED_BYTE, GL_SRGB8_ALPHA8, GL_SRGB8_ALPHA8, GL_REPEAT},
+        {paint_heights, PATTERN, PATTERN, 4, GL_UNSIGNED_BYTE, GL_RGBA8, GL_RGBA8, GL_REPEAT},
+        {paint_sky, SKY, SKY / 2, 4 * sizeof(float), GL_FLOAT, GL_RGBA16F, GL_SRGB8_ALPHA8,
+         GL_CLAMP_TO_EDGE}};
+    int width = kinds[kind].width, height = kinds[kind].height;
+    const size_t bytes = kinds[kind].bytes;
+    uint8_t *pixels = path ? NULL : drape_alloc(ctx, (size_t)width * (size_t)height, bytes);
+    drape_status status = path     ? read_png(ctx, path, &pixels, &width, &height)
+                          : pixels ? DRAPE_OK
+                                   : DRAPE_E_MEMORY;
+    if (status)
+        return status;
+    if (path) /* the bottom row first, as v grows upwards */
+        drape_gl_flip(pixels, width, height);
+    for (int j = 0; !path && j < height; j++)
+        for (int i = 0; i < width; i++)
+            kinds[kind].paint((i + 0.5) / width, (j + 0.5) / height,
+                              pixels + bytes * ((size_t)j * (size_t)width + (size_t)i));
+    *out = drape_gl_texture(path ? kinds[kind].of_file : kinds[kind].format, width, height, GL_RGBA,
+                            path ? GL_UNSIGNED_BYTE : kinds[kind].type, pixels, GL_LINEAR, GL_REPEAT);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, kinds[kind].wrap);
+    drape_free(ctx, pixels);
+    return DRAPE_OK;
 }
 
 /* ---- The colours of fields ---- */

@@ -11,18 +11,15 @@
 drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const char *path,
                              const uint8_t *pixels, int width, int height, bool small);
 
-/* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. Errors: DRAPE_E_FILE (also if the file
- * is not a PNG), DRAPE_E_MEMORY. */
-drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height);
+/* A repeating texture with mipmaps, of a file, or the built-in one if path is NULL. *out is unchanged on failure.
+ * Errors: DRAPE_E_FILE (also if the file is not a PNG), DRAPE_E_MEMORY. */
+typedef enum drape_texture_kind {
+    DRAPE_PATTERN, /* colour of the cloth; built-in: checks with the letter F, upright in the direction of v */
+    DRAPE_HEIGHTS, /* red is the height, 0 to 1, alpha is 1 where the thread is metal; built-in: a woven relief */
+    DRAPE_ENVIRONMENT /* the surroundings by longitude and latitude, linear; built-in: a room with lamps */
+} drape_texture_kind;
 
-/* Repeating textures with mipmaps, of a file, or the built-in ones if path is NULL. *out is unchanged on
- * failure.
- *   pattern      colour of the cloth; built-in: checks with the letter F, upright in the direction of v
- *   heights      red is the height, 0 to 1, alpha is 1 where the thread is metal; built-in: a woven relief
- *   environment  the surroundings by longitude and latitude, linear; built-in: a room with lamps */
-drape_status drape_texture_pattern(drape_context *ctx, const char *path, GLuint *out);
-drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint *out);
-drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out);
+drape_status drape_texture(drape_context *ctx, drape_texture_kind kind, const char *path, GLuint *out);
 
 /* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab
  * (Ottosson 2020) from a dark violet over blue and green to a light yellow, which differ in brightness

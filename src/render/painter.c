@@ -2,7 +2,6 @@
 #include "render/painter.h"
 
 #include "render/images.h"
-#include "render/layout.h"
 #include "render/lighting.h"
 
 #include <math.h>
@@ -19,7 +18,6 @@
 #define PIN          11.0f  /* size of pinned nodes in pixels at 720 rows */
 #define REFRACTED    0.45f  /* length of a refracted ray, in radii of the stage */
 #define MAX_SHADINGS 64
-#define RADIANS      0.017453292519943295f
 
 static const float unturned[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
@@ -192,13 +190,6 @@ static GLuint program(drape_context *ctx, const char *name, const char *vertex, 
                             (const char *const[]){first, second, NULL});
 }
 
-static drape_status make_texture(drape_painter *p, int which, const char *path)
-{
-    static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
-        drape_texture_pattern, drape_texture_heights, drape_texture_environment};
-    return p->textures[which] ? DRAPE_OK : makers[which](p->ctx, path, &p->textures[which]);
-}
-
 static drape_status create_all(drape_painter *p, const drape_painter_def *def)
 {
     static const int sizes[] = {3, 3, 0};
@@ -214,7 +205,7 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
         status = drape_lighting_create(p->ctx, def->width, def->height, &p->lighting);
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
-            status = make_texture(p, i, paths[i]);
+            status = drape_texture(p->ctx, (drape_texture_kind)i, paths[i], &p->textures[i]);
     if (!status && !((p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
                      (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
                      (p->body = surface_program(p->ctx, "body", body)) &&
@@ -277,18 +268,137 @@ drape_overlay *drape_painter_overlay(drape_painter *painter)
     return &painter->overlay;
 }
 
+/* ---- Layout: the places of panels, legend and lines ---- */
+
+#define STRIP  0.25f /* largest share of the picture's width for the legend */
+#define MARGIN 20    /* [pixels at 720 rows], as all below */
+#define LINE   21    /* height of a line */
+#define LEGEND 120   /* smallest height of the legend's ramp */
+#define TAB    112   /* from the beginning of a line to the text after its tab */
+
+static const float veil[4] = {1, 1, 1, 0.62f};
+
+/* In pixels from the lower left. */
+typedef struct rectangle {
+    int left, bottom, width, height;
+} rectangle;
+
+static void legend_title(const drape_shading *shading, char *title, size_t size)
+{
+    snprintf(title, size, "%s [%s]", shading->field->entry.name, shading->field->shown_unit);
+}
+
+static int columns_of(int panel_count)
+{
+    return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
+}
+
+/* The part of a panel that its camera frames, and the whole of it: at the sides of a picture the scene continues
+ * beneath lines and legend. */
+static rectangle inner_of(const drape_overlay *overlay, const drape_picture *picture, int panel)
+{
+    int count = picture->panel_count, columns = columns_of(count), rows = (count + columns - 1) / columns;
+    int column = panel % columns, row = rows - 1 - panel / columns;
+    int left = (int)picture->column, strip = 0; /* at the right, for the legend [pixels] */
+    if (picture->shading->field) {
+        char title[80];
+        legend_title(picture->shading, title, sizeof title);
+        float wide = drape_overlay_legend_width(overlay, title) + MARGIN * overlay->unit;
+        strip = (int)fminf(wide, STRIP * (float)overlay->width);
+    }
+    int width = overlay->width - left - strip;
+    rectangle b = {.left = left + column * width / columns, .bottom = row * overlay->height / rows};
+    b.width = left + (column + 1) * width / columns - b.left;
+    b.height = (row + 1) * overlay->height / rows - b.bottom;
+    return b;
+}
+
+static rectangle whole_of(const drape_overlay *overlay, const drape_picture *picture, int panel)
+{
+    rectangle b = inner_of(overlay, picture, panel);
+    int columns = columns_of(picture->panel_count), right = b.left + b.width;
+    if (panel % columns == columns - 1)
+        right = overlay->width;
+    if (panel % columns == 0)
+        b.left = 0;
+    b.width = right - b.left;
+    return b;
+}
+
+static void put_labels(drape_overlay *o, const drape_picture *picture)
+{
+    for (int i = 0; i < picture->panel_count; i++) {
+        const rectangle b = whole_of(o, picture, i);
+        const char *label = picture->panels[i].label;
+        float top = (float)(o->height - b.bottom - b.height), x = (float)b.left + MARGIN * o->unit;
+        if (b.left > 0)
+            drape_overlay_box(o, (float)b.left - o->unit, top, 2 * o->unit, (float)b.height,
+                              (const float[]){1, 1, 1, 0.9f});
+        if (!label)
+            continue;
+        drape_overlay_box(o, x - 9 * o->unit, top + 12 * o->unit,
+                          drape_font_width(&o->font, label) + 18 * o->unit, 26 * o->unit, veil);
+        drape_overlay_text(o, x, top + 30 * o->unit, DRAPE_LEFT, drape_ink, label);
+    }
+}
+
+/* Puts text from x on, broken at blanks to end before `right`; returns the number of lines. A colour of NULL
+ * only counts them. */
+static int put_wrapped(drape_overlay *o, float x, float y, float right, const float *colour, const char *text)
+{
+    int lines = 0;
+    while (*text || lines == 0) {
+        char line[200] = "";
+        size_t length = 0;
+        for (size_t next = strcspn(text, " ");; next += 1 + strcspn(text + next + 1, " ")) {
+            char more[sizeof line];
+            snprintf(more, sizeof more, "%.*s", (int)next, text);
+            if (length > 0 && x + drape_font_width(&o->font, more) > right)
+                break;
+            memcpy(line, more, sizeof line);
+            length = next;
+            if (!text[next])
+                break;
+        }
+        if (colour)
+            drape_overlay_text(o, x, y + (float)lines * LINE * o->unit, DRAPE_LEFT, colour, line);
+        text += length;
+        text += strspn(text, " ");
+        lines++;
+    }
+    return lines;
+}
+
+/* The text before a tab is a name, put in a fainter colour, of the value after it. Returns the number of lines. */
+static int put_lines(drape_overlay *o, const drape_picture *picture, bool put)
+{
+    float left = MARGIN * o->unit, right = picture->column > 0 ? picture->column : (float)o->width - left;
+    int count = 0;
+    for (int i = 0; picture->lines[i]; i++) {
+        const char *text = picture->lines[i], *tab = strchr(text, '\t');
+        float y = (30 + (float)count * LINE) * o->unit;
+        char name[80];
+        snprintf(name, sizeof name, "%.*s", tab ? (int)(tab - text) : 0, text);
+        if (put && tab)
+            drape_overlay_text(o, left, y, DRAPE_LEFT, drape_faint, name);
+        count += put_wrapped(o, tab ? left + TAB * o->unit : left, y, right, put ? drape_ink : NULL,
+                             tab ? tab + 1 : text);
+    }
+    return count;
+}
+
 /* ---- One panel ---- */
 
 float drape_painter_aspect(const drape_painter *painter, const drape_picture *picture)
 {
-    const drape_rectangle b = drape_layout_inner(&painter->overlay, picture, 0);
+    const rectangle b = inner_of(&painter->overlay, picture, 0);
     return (float)b.width / (float)b.height;
 }
 
 drape_view drape_painter_view(const drape_painter *painter, const drape_picture *picture, int panel)
 {
-    const drape_rectangle inner = drape_layout_inner(&painter->overlay, picture, panel);
-    const drape_rectangle whole = drape_layout_whole(&painter->overlay, picture, panel);
+    const rectangle inner = inner_of(&painter->overlay, picture, panel);
+    const rectangle whole = whole_of(&painter->overlay, picture, panel);
     float left = (float)(inner.left - whole.left), right = left + (float)inner.width;
     const float low[2] = {2 * left / (float)whole.width - 1, -1};
     const float high[2] = {2 * right / (float)whole.width - 1, 1};
@@ -522,7 +632,7 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
         p->shadings[number] = surface_program(p->ctx, shading->entry.name,
                                               (const char *const[]){shading->source, surface_main, NULL});
     GLuint program = p->shadings[number];
-    const drape_rectangle whole = drape_layout_whole(&p->overlay, picture, index);
+    const rectangle whole = whole_of(&p->overlay, picture, index);
     panel_view v = {.left = whole.left,
                     .bottom = whole.bottom,
                     .width = whole.width,
@@ -532,8 +642,8 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
                     .reach = REFRACTED * stage->radius};
     drape_status status = program ? DRAPE_OK : DRAPE_E_FILE;
     for (int i = 0; i < 3 && !status; i++)
-        if (shading->reads & 1 << i)
-            status = make_texture(p, i, NULL);
+        if (shading->reads & 1 << i && !p->textures[i])
+            status = drape_texture(p->ctx, (drape_texture_kind)i, NULL, &p->textures[i]);
     if (status)
         return status;
     v.view = drape_painter_view(p, picture, index);
@@ -556,8 +666,26 @@ drape_status drape_painter_draw(drape_painter *painter, const drape_picture *pic
     if (status)
         return status;
     glViewport(0, 0, painter->canvas.width, painter->canvas.height);
-    drape_layout_put(&painter->overlay, picture);
-    drape_overlay_draw(&painter->overlay);
+    const drape_field_ops *field = picture->shading->field;
+    drape_overlay *o = &painter->overlay;
+    const float u = o->unit, width = (float)o->width, height = (float)o->height;
+    if (field) {
+        char title[80];
+        legend_title(picture->shading, title, sizeof title);
+        drape_overlay_legend(o, width - 22 * u, height - 26 * u,
+                             fminf(fmaxf(0.36f * height, LEGEND * u), 0.6f * height), title,
+                             field->shown * picture->low, field->shown * picture->high);
+    }
+    put_labels(o, picture);
+    if (picture->lines && picture->lines[0]) { /* on a translucent ground, to be readable over cloth too */
+        const float wide = picture->column > 0 ? picture->column : width;
+        drape_overlay_box(o, 10 * u, 9 * u, wide - 4 * u,
+                          ((float)put_lines(o, picture, false) * LINE + 12) * u, veil);
+        put_lines(o, picture, true);
+    }
+    if (picture->caption)
+        drape_overlay_text(o, MARGIN * u, height - 22 * u, DRAPE_LEFT, drape_faint, picture->caption);
+    drape_overlay_draw(o);
     glFlush(); /* the driver draws while the caller goes on */
     return drape_gl_check(painter->ctx, "draw a picture");
 }

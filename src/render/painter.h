@@ -5,7 +5,6 @@
 #ifndef DRAPE_RENDER_PAINTER_H
 #define DRAPE_RENDER_PAINTER_H
 
-#include "render/canvas.h"
 #include "render/overlay.h"
 #include "render/shading.h"
 #include "render/stage.h"
