@@ -264,36 +264,32 @@ static void report_order(const sequence *s, FILE *out)
 
 /* ---- The figures and the tables ---- */
 
-/* The refinements that the line is fitted through are filled markers, or all, if there is none; others are
- * open. Returns whether there are others. */
-static bool draw_sequence(lab_figure *f, const sequence *s)
-{
-    char text[96];
-    const lab_style style = lab_style_of(s->integrator, s->variant), open = lab_style_of(s->integrator, 1);
-    const size_t first = s->fitted ? s->count - s->fitted : 0;
-    lab_figure_data(f);
-    for (size_t i = 0; i < first; i++)
-        lab_figure_point(f, s->value[i], s->moved[i]);
-    lab_figure_curve(f, (lab_style){style.colour, 0, open.point}, NULL);
-    lab_figure_data(f);
-    for (size_t i = first; i < s->count; i++)
-        lab_figure_point(f, s->value[i], s->moved[i]);
-    snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
-    lab_figure_curve(f, style, text);
-    return first > 0;
-}
-
-/* The sequences over one knob. */
+/* The sequences over one knob. The refinements that a line is fitted through are filled markers, or all, if there is
+ * none; others are open. */
 static drape_status draw(lab *l, const sequence *sequences, size_t count, const char *knob, const char *label)
 {
     lab_figure f;
-    char name[96];
+    char name[96], text[96];
     bool others = false;
     snprintf(name, sizeof name, "converge_%s", knob);
     lab_figure_begin(l, &f, name);
-    for (const sequence *s = sequences; s < sequences + count; s++)
-        if (strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) == 0)
-            others |= draw_sequence(&f, s);
+    for (const sequence *s = sequences; s < sequences + count; s++) {
+        const lab_style style = lab_style_of(s->integrator, s->variant),
+                        open = lab_style_of(s->integrator, 1);
+        const size_t first = s->fitted ? s->count - s->fitted : 0;
+        if (strcmp(is_tolerance(s) ? "rtol" : s->knob, knob) != 0)
+            continue;
+        lab_figure_data(&f);
+        for (size_t i = 0; i < first; i++)
+            lab_figure_point(&f, s->value[i], s->moved[i]);
+        lab_figure_curve(&f, (lab_style){style.colour, 0, open.point}, NULL);
+        lab_figure_data(&f);
+        for (size_t i = first; i < s->count; i++)
+            lab_figure_point(&f, s->value[i], s->moved[i]);
+        snprintf(text, sizeof text, isnan(s->line.slope) ? "%s" : "%s (%.2f)", s->series, s->line.slope);
+        lab_figure_curve(&f, style, text);
+        others |= first > 0;
+    }
     snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
     snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
     if (others)

@@ -243,8 +243,7 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
     if (!(error <= goal))
         return drape_fail(
             s->arena->ctx, DRAPE_E_SOLVER,
-            "%.300s: no reference: its families of methods agree to %.2g of the size; they must "
-            "to %.0e",
+            "%.300s: no reference: its families of methods agree to %.2g of the size; they must to %.0e",
             s->path, error, goal);
     fprintf(out, "reference %s, agrees with another family to %.2g of the size\n", best->family->method,
             error);

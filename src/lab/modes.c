@@ -260,8 +260,7 @@ static drape_status search_all(problem *p, int32_t wanted, int64_t *below)
     if (missing > 0 && p->buckling && p->count < wanted)
         return drape_fail(
             p->ctx, DRAPE_E_SOLVER,
-            "only %d of %d buckling loads were found; with loads in this direction there may be "
-            "no more",
+            "only %d of %d buckling loads were found; with loads in this direction there may be no more",
             (int)p->count, (int)wanted);
     return missing < 0 ? drape_fail(p->ctx, DRAPE_E_SOLVER,
                                     "%d modes were found, but whether these are all up to there is not known",

@@ -67,9 +67,8 @@ DRAPE_REFERENCE(roller_tension, .entry.summary = "force per width of a sheet dra
                 SHEET(SQUARE, .columns = 5, .rows = 5, .young_modulus = 1e5, .poisson_ratio = 0.3,
                       .thickness = 1e-3, .areal_density = 0.2, .terms = "'stretch.cst'", .tolerance = 1e-10,
                       .pins = "{'edge': 'left', 'normal': [1, 0, 0]}, {'edge': 'right', 'normal': [1, 0, 0], "
-                              "'track': [[0, [0, 0, 0]], [1, [@, 0, 0]]]},\n "
-                              "{'corner': 'top-left', 'normal': [0, 0, 1]}, "
-                              "{'box': [[-1, -1, -1], [1, 1, 1]], 'normal': [0, 1, 0]}",
+                              "'track': [[0, [0, 0, 0]], [1, [@, 0, 0]]]},\n {'corner': 'top-left', "
+                              "'normal': [0, 0, 1]}, {'box': [[-1, -1, -1], [1, 1, 1]], 'normal': [0, 1, 0]}",
                       .factor = SIDE));
 
 /* ---- Shear, as KES-FB1 measures it: one edge moves along itself while a force W per length holds the sheet

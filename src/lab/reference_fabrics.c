@@ -34,8 +34,13 @@ static double chord(double unused)
     return drape_rod_chord(8);
 }
 
-static int cantilever(const drape_fabric *f, double rigidity, const char *warp, char text[DRAPE_LAB_TEXT])
+/* constants: whether it is along the weft. */
+static int cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
+    const drape_fabric *f = &drape_fabrics[(int)c->parameter];
+    const bool weft = c->reference->constants[0] > 0;
+    const char *warp = weft ? "[0, 0, 1]" : "[1, 0, 0]";
+    const double rigidity = weft ? f->bending.weft : f->bending.warp;
     const double weight = f->areal_density * GRAVITY, length = 2 * cbrt(rigidity / weight);
     return SHEET_TEXT(text, .columns = 41, .rows = 5, .width = length, .height = length / 10,
                       .material = SHEET_FORMAT("'fabric': '%s'", f->name),
@@ -46,28 +51,15 @@ static int cantilever(const drape_fabric *f, double rigidity, const char *warp, 
                       .tolerance = weight * length * length / 10 / 205 * 1e-4);
 }
 
-static int warp_cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    const drape_fabric *f = &drape_fabrics[(int)c->parameter];
-    return cantilever(f, f->bending.warp, "[1, 0, 0]", text);
-}
-
-static int weft_cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    const drape_fabric *f = &drape_fabrics[(int)c->parameter];
-    return cantilever(f, f->bending.weft, "[0, 0, 1]", text);
-}
-
 #define CANTILEVER                                                                                           \
     .unit = "degree", FABRIC, .model = "stretch.cst, bend.midedge; irregular",                               \
     .entry.reference = "ASTM D1388; the fabric's own", .tolerance = 0.005, .expected = chord,                \
-    .value = lab_chord
+    .scene = cantilever, .value = lab_chord
 
-DRAPE_REFERENCE(fabric, CANTILEVER, .entry.summary = "angle of the chord of a strip along the warp",
-                .scene = warp_cantilever);
+DRAPE_REFERENCE(fabric, CANTILEVER, .entry.summary = "angle of the chord of a strip along the warp");
 
 DRAPE_REFERENCE(fabric_weft, CANTILEVER, .entry.summary = "angle of the chord of a strip along the weft",
-                .scene = weft_cantilever);
+                .constants = {1});
 
 /* ---- The lengthening of a strip of 1 m that hangs from its upper edge, under its weight or a pull ----
  *
@@ -76,12 +68,17 @@ DRAPE_REFERENCE(fabric_weft, CANTILEVER, .entry.summary = "angle of the chord of
 #define WIDTH   0.02 /* [m]: the fixed edge keeps some widths of the strip from narrowing */
 #define STRETCH 1.02 /* by the pull */
 
-/* pull: force per width at the lower edge [N/m] */
-static int hung_scene(double place, const char *warp, double pull, double gravity, char text[DRAPE_LAB_TEXT])
+/* constants: whether it is pulled along the weft, instead of hung along the warp. */
+static int hung_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
+    const bool pulled = c->reference->constants[0] > 0;
+    const char *warp = pulled ? "[1, 0, 0]" : "[0, 1, 0]";
+    const double gravity = pulled ? 0 : GRAVITY;
+    /* Force per width at the lower edge [N/m]. */
+    const double pull = pulled ? tension_of(c->parameter).weft * STRETCH * (STRETCH * STRETCH - 1) / 2 : 0;
     return SHEET_TEXT(text, .columns = 3, .rows = 101, .width = WIDTH, .height = 1,
                       .mesh = "'orientation': 'vertical'",
-                      .material = SHEET_FORMAT("'fabric': '%s'", drape_fabrics[(int)place].name),
+                      .material = SHEET_FORMAT("'fabric': '%s'", drape_fabrics[(int)c->parameter].name),
                       .terms = SHEET_FORMAT("{'type': 'stretch.cst', 'warp_direction': %s}, "
                                             "{'type': 'bend.midedge', 'warp_direction': %s}, "
                                             "{'type': 'load.line', 'edge': 'bottom', 'force': [0, %.17g, 0]}",
@@ -105,17 +102,11 @@ static double lengthening(const drape_reference_run *run)
 
 #define HUNG                                                                                                 \
     .unit = "m", FABRIC, .model = "stretch.cst, bend.midedge; irregular", .tolerance = 0.01,                 \
-    .value = lengthening
-
-static int pulled_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    const double pull = tension_of(c->parameter).weft * STRETCH * (STRETCH * STRETCH - 1) / 2;
-    return hung_scene(c->parameter, "[1, 0, 0]", pull, 0, text);
-}
+    .value = lengthening, .scene = hung_scene
 
 DRAPE_REFERENCE(fabric_tension, HUNG, .entry.summary = "lengthening of a strip of 1 m, pulled along the weft",
                 .entry.reference = "K l (l^2 - 1)/2; the fabric's own", DRAPE_KNOWN(STRETCH - 1),
-                .scene = pulled_scene);
+                .constants = {1});
 
 typedef struct hung_strip {
     double stiffness, weight; /* [N/m], [N/m2] */
@@ -148,14 +139,8 @@ static double hanging(double place)
     return value;
 }
 
-static int hanging_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    return hung_scene(c->parameter, "[0, 1, 0]", 0, GRAVITY, text);
-}
-
 DRAPE_REFERENCE(hanging, HUNG, .entry.summary = "lengthening of a strip of 1 m, hung along the warp",
-                .entry.reference = "K l (l^2 - 1)/2 = rho g s; the fabric's own", .expected = hanging,
-                .scene = hanging_scene);
+                .entry.reference = "K l (l^2 - 1)/2 = rho g s; the fabric's own", .expected = hanging);
 
 /* ---- The shear stiffness of a square whose lower edge is moved parallel to the upper one by gamma ----
  *

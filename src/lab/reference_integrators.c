@@ -51,8 +51,8 @@ static double energy(const drape_reference_run *run)
     return e.kinetic + e.elastic;
 }
 
-/* The factor of the amplitude in a step, from energies. Constants: how many steps come before, and how many
- * are measured. */
+/* The factor of the amplitude in a step, from energies. Constants: how many steps come before, how many are
+ * measured, and whether the factor is that of the energy. */
 static drape_status measure_amplitude(drape_reference_run *run, double *value)
 {
     const int from = (int)run->reference->constants[0];
@@ -61,7 +61,7 @@ static drape_status measure_amplitude(drape_reference_run *run, double *value)
     const double before = energy(run);
     if (!status)
         status = advance(run, steps);
-    *value = pow(energy(run) / before, 0.5 / steps);
+    *value = pow(energy(run) / before, (run->reference->constants[2] > 0 ? 1 : 0.5) / steps);
     return status;
 }
 
@@ -104,17 +104,10 @@ static double euler(double angle)
     return 1 / (1 + angle * angle);
 }
 
-static drape_status measure_energy(drape_reference_run *run, double *value)
-{
-    drape_status status = measure_amplitude(run, value);
-    *value *= *value;
-    return status;
-}
-
 DRAPE_REFERENCE(oscillator, OSCILLATOR("'be'"), .entry.summary = "fraction of the energy that a step leaves",
                 DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; be",
                 .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .expected = euler,
-                .measure = measure_energy, .constants = {0, 20});
+                .measure = measure_amplitude, .constants = {0, 20, 1});
 
 /* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots (2 +- sqrt(1 + 2 i omega
  * h))/(3 - 2 i omega h). The larger is the factor of the amplitude per step once the other has decayed, to

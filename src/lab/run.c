@@ -231,7 +231,8 @@ static json_t *describe(const run *r, drape_sim *sim)
     const struct {
         const char *key;
         double value;
-    } reals[] = {
+        bool counts; /* an integer */
+    } numbers[] = {
         {"time_s", drape_sim_time(sim)},
         {"cpu_s", r->cpu},
         {"wall_s", r->wall},
@@ -246,19 +247,16 @@ static json_t *describe(const run *r, drape_sim *sim)
         {"iterations_per_step", accepted > 0 ? (double)s.newton_iterations / accepted : NAN},
         {"h_min_s", s.h_min},
         {"h_max_s", s.h_max},
-        {"explicit_limit_s", r->explicit_limit}};
-    const struct {
-        const char *key;
-        int64_t value;
-    } counts[] = {{"nodes", drape_model_node_count(r->model)},
-                  {"accepted", s.steps_accepted},
-                  {"rejected", s.steps_rejected},
-                  {"unconverged", s.steps_unconverged},
-                  {"iterations", s.newton_iterations},
-                  {"residuals", s.residuals},
-                  {"jacobians", s.jacobians},
-                  {"factorizations", s.factorizations},
-                  {"linear_iterations", s.linear_iterations}};
+        {"explicit_limit_s", r->explicit_limit},
+        {"nodes", (double)drape_model_node_count(r->model), true},
+        {"accepted", (double)s.steps_accepted, true},
+        {"rejected", (double)s.steps_rejected, true},
+        {"unconverged", (double)s.steps_unconverged, true},
+        {"iterations", (double)s.newton_iterations, true},
+        {"residuals", (double)s.residuals, true},
+        {"jacobians", (double)s.jacobians, true},
+        {"factorizations", (double)s.factorizations, true},
+        {"linear_iterations", (double)s.linear_iterations, true}};
     /* A case that took too long is not a failure of the simulation. */
     json_t *result = json_pack("{s:s, s:s}", "status",
                                r->over_budget ? "over_budget" : drape_status_name(r->status), "message",
@@ -268,10 +266,10 @@ static json_t *describe(const run *r, drape_sim *sim)
     int64_t count;
     for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
         json_object_set_new(reasons, reason, json_integer(count));
-    for (size_t i = 0; i < sizeof reals / sizeof *reals; i++)
-        json_object_set_new(result, reals[i].key, drape_json_number(reals[i].value));
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        json_object_set_new(result, counts[i].key, json_integer(counts[i].value));
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        json_object_set_new(result, numbers[i].key,
+                            numbers[i].counts ? json_integer((json_int_t)numbers[i].value)
+                                              : drape_json_number(numbers[i].value));
     json_object_set_new(result, "reasons", reasons);
     if (compares)
         json_object_set_new(result, "reference_error_m", drape_json_number(request->reference_error));

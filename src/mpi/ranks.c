@@ -7,38 +7,32 @@
 
 /* ---- Sums ---- */
 
-static void gather(drape_mpi_ranks *r, const double *values, int n)
+/* Each value over all ranks: the sum, or the largest, which is NaN if one is. */
+static void reduce(const drape_ranks *ranks, double *values, int n, bool adds)
 {
-    MPI_Allgather(values, n, MPI_DOUBLE, r->gathered, n, MPI_DOUBLE, r->comm);
+    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
+    for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
+        const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
+        MPI_Allgather(values + first, count, MPI_DOUBLE, r->gathered, count, MPI_DOUBLE, r->comm);
+        for (int i = 0; i < count; i++) {
+            double all = adds ? 0 : r->gathered[i];
+            for (int k = 0; k < ranks->count; k++) {
+                const double one = r->gathered[k * count + i];
+                all = adds ? all + one : one <= all || isnan(all) ? all : one;
+            }
+            values[first + i] = all;
+        }
+    }
 }
 
 static void sum(const drape_ranks *ranks, double *values, int n)
 {
-    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
-    for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
-        const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
-        gather(r, values + first, count);
-        for (int i = 0; i < count; i++) {
-            values[first + i] = 0;
-            for (int k = 0; k < ranks->count; k++)
-                values[first + i] += r->gathered[k * count + i];
-        }
-    }
+    reduce(ranks, values, n, true);
 }
 
 static void largest(const drape_ranks *ranks, double *values, int n)
 {
-    drape_mpi_ranks *r = drape_mpi_ranks_of(ranks);
-    for (int first = 0; first < n; first += DRAPE_MPI_VALUES) {
-        const int count = n - first < DRAPE_MPI_VALUES ? n - first : DRAPE_MPI_VALUES;
-        gather(r, values + first, count);
-        for (int i = 0; i < count; i++) {
-            double most = r->gathered[i];
-            for (int k = 1; k < ranks->count; k++)
-                most = r->gathered[k * count + i] <= most || isnan(most) ? most : r->gathered[k * count + i];
-            values[first + i] = most;
-        }
-    }
+    reduce(ranks, values, n, false);
 }
 
 static void broadcast(const drape_ranks *ranks, int from, void *bytes, int size)

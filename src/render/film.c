@@ -98,26 +98,6 @@ static int add_args(char *text, char **args, int count)
     return count;
 }
 
-/* The child reads the pipe as its standard input and writes both outputs into the file of errors. */
-static drape_status spawn(drape_film *film, char **args, int reading)
-{
-    posix_spawn_file_actions_t actions;
-    const int copies[][2] = {{reading, STDIN_FILENO},
-                             {film->errors, STDOUT_FILENO},
-                             {film->errors, STDERR_FILENO},
-                             {film->file.fd, CHILD_FILE}};
-    int error = posix_spawn_file_actions_init(&actions);
-    for (int i = 0; !error && i < 4; i++)
-        error = posix_spawn_file_actions_adddup2(&actions, copies[i][0], copies[i][1]);
-    if (!error)
-        error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, args, environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (!error)
-        return DRAPE_OK;
-    film->child = 0;
-    return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
-}
-
 static drape_status start(drape_film *film, int width, int height, double rate)
 {
     char input[200], output[600], *args[MAX_ARGS] = {PROGRAM};
@@ -138,9 +118,23 @@ static drape_status start(drape_film *film, int width, int height, double rate)
     film->pipe = fcntl(ends[1], F_DUPFD_CLOEXEC, 3);
     close(ends[1]);
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
-    drape_status status = spawn(film, args, ends[0]);
+    /* The child reads the pipe as its standard input and writes both outputs into the file of errors. */
+    const int copies[][2] = {{ends[0], STDIN_FILENO},
+                             {film->errors, STDOUT_FILENO},
+                             {film->errors, STDERR_FILENO},
+                             {film->file.fd, CHILD_FILE}};
+    posix_spawn_file_actions_t actions;
+    int error = posix_spawn_file_actions_init(&actions);
+    for (int i = 0; !error && i < 4; i++)
+        error = posix_spawn_file_actions_adddup2(&actions, copies[i][0], copies[i][1]);
+    if (!error)
+        error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, args, environ);
+    posix_spawn_file_actions_destroy(&actions);
     close(ends[0]);
-    return status;
+    if (!error)
+        return DRAPE_OK;
+    film->child = 0;
+    return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
 }
 
 drape_status drape_film_begin(drape_context *ctx, const char *path, int width, int height, double rate,

@@ -83,8 +83,7 @@ static const char ground_source[] =
     "uniform float radius, solid;\n"
     "\n"
     "// Continues the wall towards the eye, so that no horizon is seen, and fades into it. Without a ground "
-    "in the "
-    "scene only the shadow is drawn.\n"
+    "in the scene only the shadow is drawn.\n"
     "void main() {\n"
     "    vec3 c = wall(), far = (place - center) / radius;\n"
     "    float fade = 1.0 - smoothstep(1.3, 3.3, sqrt(dot(far, far))), facing = dot(normal, light) / "
@@ -411,12 +410,11 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
 /* The quantities common to everything drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
-    drape_lighting_view light;       /* of the lamp */
-    float window[3];                 /* direction to a window opposite it */
-    int left, bottom, width, height; /* pixels */
-    bool first;                      /* of the picture */
-    float clear, reach;              /* of the shading; length of a refracted ray [m] */
-    GLuint behind;                   /* texture of the picture without cloth; 0: none */
+    drape_lighting_view light; /* of the lamp, and of the panel's place */
+    float window[3];           /* direction to a window opposite it */
+    bool first;                /* of the picture */
+    float clear, reach;        /* of the shading; length of a refracted ray [m] */
+    GLuint behind;             /* texture of the picture without cloth; 0: none */
 } panel_view;
 
 static void set_lamp(const drape_stage *stage, panel_view *v)
@@ -438,17 +436,13 @@ static void set_lamp(const drape_stage *stage, panel_view *v)
     l->width = 2 * SHADOW_REACH * reach;
     l->range = far - near;
     l->radius = reach;
-    l->scale = (float)v->height / (2 * v->view.ty);
-    l->left = v->left;
-    l->bottom = v->bottom;
-    l->panel_width = v->width;
-    l->panel_height = v->height;
+    l->scale = (float)v->light.panel_height / (2 * v->view.ty);
 }
 
 static void set_box(GLuint program, const char *name, const panel_view *v)
 {
-    glUniform4f(glGetUniformLocation(program, name), (float)v->left, (float)v->bottom, (float)v->width,
-                (float)v->height);
+    glUniform4f(glGetUniformLocation(program, name), (float)v->light.left, (float)v->light.bottom,
+                (float)v->light.panel_width, (float)v->light.panel_height);
 }
 
 /* Sets the uniforms and textures that all programs of surfaces share. */
@@ -554,14 +548,14 @@ static void light_panel(const drape_painter *p, const drape_stage *stage, const 
 static void use_canvas(const drape_painter *p, const panel_view *v)
 {
     glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
-    glViewport(v->left, v->bottom, v->width, v->height);
+    glViewport(v->light.left, v->light.bottom, v->light.panel_width, v->light.panel_height);
 }
 
 static void draw_wires(const drape_painter *p, const drape_stage *stage, const drape_camera *camera,
                        const panel_view *v)
 {
     /* the mean edge in pixels at the camera's distance */
-    float edge = stage->skin.edge / (2 * camera->distance * v->view.ty) * (float)v->height;
+    float edge = stage->skin.edge / (2 * camera->distance * v->view.ty) * (float)v->light.panel_height;
     float width = fminf(WIRE * p->overlay.unit, WIRE_SHARE * edge);
     const float thin = fminf(1, width); /* lines thinner than a pixel are drawn fainter */
     glEnable(GL_BLEND);
@@ -569,7 +563,7 @@ static void draw_wires(const drape_painter *p, const drape_stage *stage, const d
     glUseProgram(p->wire);
     drape_gl_set_matrix(p->wire, "view", v->view.matrix.m);
     drape_gl_set_vec3(p->wire, "eye", v->view.eye);
-    drape_gl_set_vec2(p->wire, "size", (float)v->width, (float)v->height);
+    drape_gl_set_vec2(p->wire, "size", (float)v->light.panel_width, (float)v->light.panel_height);
     drape_gl_set_float(p->wire, "width", fmaxf(1, width));
     glUniform4f(glGetUniformLocation(p->wire, "ink"), 0.80f, 0.11f, 0.10f, thin);
     glBindVertexArray(stage->wires.array);
@@ -633,10 +627,10 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
                                               (const char *const[]){shading->source, surface_main, NULL});
     GLuint program = p->shadings[number];
     const rectangle whole = whole_of(&p->overlay, picture, index);
-    panel_view v = {.left = whole.left,
-                    .bottom = whole.bottom,
-                    .width = whole.width,
-                    .height = whole.height,
+    panel_view v = {.light = {.left = whole.left,
+                              .bottom = whole.bottom,
+                              .panel_width = whole.width,
+                              .panel_height = whole.height},
                     .first = index == 0,
                     .clear = shading->clear,
                     .reach = REFRACTED * stage->radius};

@@ -22,7 +22,6 @@ const drape_shading drape_shading_linen = {
               "    vec3 base = (s.piece < 0.5 ? undyed : 1.2 * tint(s)) * tone; // further cloths are dyed\n"
               "    vec3 lit = base * arriving(s) / PI * 1.40;\n"
               "    return lit + base * (0.55 * fuzz(s.n, s.v, 0.55) * LAMP * s.sun + 0.10 * s.open * "
-              "power(1.0 - dot(s.n, "
-              "s.v), 3.0));\n"
+              "power(1.0 - dot(s.n, s.v), 3.0));\n"
               "}\n",
 };

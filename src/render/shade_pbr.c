@@ -25,7 +25,6 @@ const drape_shading drape_shading_pbr = {
         "    vec3 direct = (matt * (1.0 - f) + f * facets * seen) * nl * LAMP * 2.2 * s.sun;\n"
         "    vec3 rim = f0 + (max(vec3(1.0 - rough), f0) - f0) * power(1.0 - nv, 5.0);\n"
         "    return direct + s.open * (matt * room(n) * 2.2 + rim * world(reflect(-s.v, n), min(1.0, 1.6 * "
-        "rough)) * "
-        "1.25);\n"
+        "rough)) * 1.25);\n"
         "}\n",
 };

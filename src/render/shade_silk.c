@@ -23,7 +23,6 @@ const drape_shading drape_shading_silk = {
               "    float rim = schlick(dot(n, s.v), 0.04);\n"
               "    vec3 glow = mix(base, vec3(0.80, 0.88, 0.86), 0.45);\n"
               "    return base * arriving(s, n) / PI * 1.35 + glow * (0.40 * shine * LAMP * s.sun + 0.20 * "
-              "far * s.open * "
-              "vec3(0.9, 1.0, 1.1)) + rim * s.open * room(n) * 0.42;\n"
+              "far * s.open * vec3(0.9, 1.0, 1.1)) + rim * s.open * room(n) * 0.42;\n"
               "}\n",
 };
