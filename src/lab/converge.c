@@ -46,10 +46,8 @@ static drape_status add_time(lab *l, const drape_integrator_ops *integrator, con
     const lab_grid grid = {.knob = fixed ? NULL
                                    : own ? BY_RTOL
                                          : OWN,
-                           .rtols = levels,
-                           .steps = levels,
-                           .rtol_count = (size_t)l->def->levels,
-                           .step_count = (size_t)l->def->levels};
+                           .rtols = {levels, (size_t)l->def->levels},
+                           .steps = {levels, (size_t)l->def->levels}};
     return lab_add_integrator(l, &grid, integrator);
 }
 

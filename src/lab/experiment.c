@@ -1,14 +1,22 @@
-/* experiment.c: an experiment from its def to its report, and the merging of shards. */
+/*
+ * experiment.c: an experiment from its def to its report, and the merging of shards. Its cases are run by several
+ * threads into a file of lines. A case that has a line is not run again; a line that a kill cut short is dropped, and
+ * its case is run again.
+ */
 #include "drape/lab.h"
 
 #include "base/clock.h"
 #include "base/def.h"
+#include "base/json_read.h"
 #include "base/param.h"
+#include "io/export.h"
 #include "lab/lab.h"
 #include "lab/text.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -72,12 +80,6 @@ drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_a
     return failed ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the cases") : DRAPE_OK;
 }
 
-void lab_rank_case(lab *l, int rank)
-{
-    json_t *last = json_array_get(l->cases, json_array_size(l->cases) - 1);
-    json_object_set_new(last, "rank", json_integer(rank));
-}
-
 const drape_integrator_ops *lab_find_integrator(const char *name)
 {
     const int i = drape_registry_find(&drape_integrator_registry, NULL, name);
@@ -102,6 +104,243 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
         if (strcmp(l->def->integrators[i], name) == 0)
             return true;
     return l->def->integrator_count == 0 && fallback;
+}
+
+/* ---- Lines ---- */
+
+static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
+{
+    json_error_t fault;
+    json_t *line = drape_json_read(text, strlen(text), JSON_REJECT_DUPLICATES, &fault);
+    if (!line && json_error_code(&fault) == json_error_out_of_memory)
+        return drape_fail_memory(l->ctx, strlen(text));
+    drape_status status = lab_check_line(l, path, number, line, &fault);
+    json_t **result = status ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
+    if (!result || *result) {
+        json_decref(line);
+        return status;
+    }
+    *result = line;
+    ++*found;
+    return DRAPE_OK;
+}
+
+/* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay. *found counts
+ * the new ones. */
+static drape_status read_lines(lab *l, const char *folder, int64_t *found)
+{
+    DIR *entries = opendir(folder);
+    if (!entries)
+        return drape_file_fail(l->ctx, "read", folder, errno);
+    drape_status status = DRAPE_OK;
+    for (struct dirent *e = readdir(entries); e && !status; e = readdir(entries)) {
+        char path[4096], *text;
+        size_t size = strlen(e->d_name);
+        int64_t n = 1;
+        const size_t ending = strlen(".jsonl");
+        if (strncmp(e->d_name, "cases", 5) != 0 || size < ending ||
+            strcmp(e->d_name + size - ending, ".jsonl") != 0)
+            continue;
+        snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
+        status = drape_file_read(l->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+        /* A last line without its end was cut short. */
+        for (char *line = text, *end; !status && (end = strchr(line, '\n')); line = end + 1) {
+            *end = 0;
+            status = take_line(l, path, n++, line, found);
+        }
+        drape_free(l->ctx, text);
+    }
+    closedir(entries);
+    return status;
+}
+
+void lab_put_line(drape_file *file, const json_t *object)
+{
+    drape_json_put(file, object, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    drape_file_put_text(file, "\n");
+}
+
+/* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller destroys it in
+ * any case. */
+static drape_status begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
+{
+    drape_status status = drape_export_begin(l->ctx, l->out, name, file);
+    for (size_t i = 0; !status && i < l->count; i++)
+        if (l->results[i] && i % (size_t)shards == (size_t)(shard - 1))
+            lab_put_line(file, l->results[i]);
+    return status;
+}
+
+/* ---- Cases ---- */
+
+/* The state that the threads of a sweep share. All but the flag is read and written under the lock. */
+typedef struct sweep {
+    lab *l;
+    drape_file file;
+    pthread_mutex_t lock;
+    atomic_bool given_up;
+    size_t *order;       /* the cases, those of low rank first; in l->arena */
+    size_t count;        /* of these */
+    size_t next;         /* in that order, the first case that no thread has taken yet */
+    double deadline;     /* [s] wall: when the budget is used up; 0: never */
+    int64_t done, total; /* of this shard */
+    int64_t before;      /* done when it began */
+    double start;        /* [s] wall */
+    drape_status status; /* the first failure; its message is set on l->ctx */
+} sweep;
+
+/* Under the lock. */
+static void stop(sweep *s, drape_status status)
+{
+    if (!s->status)
+        s->status = status;
+    atomic_store(&s->given_up, true);
+}
+
+/* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
+ * thread failed. */
+static size_t take_case(sweep *s)
+{
+    lab *l = s->l;
+    pthread_mutex_lock(&s->lock);
+    while (s->next < s->count && (!lab_is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
+        s->next++;
+    const size_t mine =
+        s->status || s->next >= s->count || (s->deadline > 0 && drape_clock_seconds() > s->deadline)
+            ? l->count
+            : s->order[s->next++];
+    pthread_mutex_unlock(&s->lock);
+    return mine;
+}
+
+/* Completes a result, saves it as a line and reports progress. Under the lock. */
+static void keep(sweep *s, size_t i, json_t *result)
+{
+    lab *l = s->l;
+    const drape_lab_def *def = l->def;
+    json_t *tags = json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags"));
+    const bool failed = json_object_set_new(result, "case", json_integer((json_int_t)i)) ||
+                        json_object_set_new(result, "tags", tags);
+    l->results[i] = result;
+    if (failed) {
+        stop(s, drape_fail_memory(l->ctx, 1));
+        return;
+    }
+    s->done++;
+    lab_put_line(&s->file, result);
+    drape_status status = drape_file_keep(&s->file);
+    if (status)
+        stop(s, status);
+    const double wall = drape_clock_seconds() - s->start;
+    const int64_t fresh = s->done - s->before;
+    if (def->progress)
+        def->progress(def->user, s->done, s->total, wall / (double)fresh * (double)(s->total - s->done));
+}
+
+lab_request lab_request_of(const lab *l, size_t index)
+{
+    lab_request request = {.def = l->def,
+                           .identity = lab_text(l->about, "scene_hash"),
+                           .identified = json_object_get(json_array_get(l->cases, 0), "settings"),
+                           .settings = json_object_get(json_array_get(l->cases, index), "settings"),
+                           .reference = &l->reference,
+                           .reference_error = l->reference_error,
+                           .probe = &l->probe,
+                           .seconds = l->def->case_seconds,
+                           .repeats = l->experiment->compares_costs ? l->def->repeats : 1};
+    if (l->experiment->request)
+        l->experiment->request(l, index, &request);
+    return request;
+}
+
+/* A thread: runs cases until there is none left. */
+static void *work(void *user)
+{
+    sweep *s = user;
+    lab *l = s->l;
+    drape_context *ctx = NULL;
+    locale_t old = drape_locale_enter();
+    if (drape_context_create(&l->ctx->def, &ctx)) {
+        pthread_mutex_lock(&s->lock);
+        stop(s, drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a context"));
+        pthread_mutex_unlock(&s->lock);
+    }
+    for (size_t i = ctx ? take_case(s) : l->count; i < l->count; i = take_case(s)) {
+        json_t *result = NULL;
+        const double start = drape_clock_thread_seconds();
+        lab_request request = lab_request_of(l, i);
+        request.deadline = s->deadline;
+        request.given_up = &s->given_up;
+        drape_status status = lab_run(ctx, &request, &result);
+        if (!status && result)
+            status = lab_check_identity(ctx, &request);
+        if (result)
+            json_object_set_new(result, "case_cpu_s", json_real(drape_clock_thread_seconds() - start));
+        pthread_mutex_lock(&s->lock);
+        if (!status && result)
+            keep(s, i, result);
+        else if (status &&
+                 (status != DRAPE_E_STOPPED || !s->status)) /* else given up for an earlier failure */
+            stop(s, drape_fail(l->ctx, status, "%s", drape_context_message(ctx)));
+        if (status)
+            json_decref(result);
+        pthread_mutex_unlock(&s->lock);
+    }
+    drape_context_destroy(&ctx);
+    drape_locale_leave(old);
+    return NULL;
+}
+
+/* The name of the file of lines that this process writes. */
+static void cases_name(const lab *l, char name[64])
+{
+    if (l->def->shards > 1)
+        snprintf(name, 64, "cases-%d-of-%d.jsonl", l->def->shard, l->def->shards);
+    else
+        snprintf(name, 64, "cases.jsonl");
+}
+
+/* Runs the cases of this shard that have no result; each becomes a line as soon as it is done. */
+static drape_status sweep_cases(lab *l)
+{
+    char name[64];
+    pthread_t threads[256];
+    int started = 0;
+    sweep s = {.l = l, .start = drape_clock_seconds()};
+    s.deadline = l->def->budget_seconds > 0 ? l->start + l->def->budget_seconds : 0;
+    s.order = drape_arena_take(&l->arena, l->count, sizeof *s.order);
+    if (!s.order)
+        return DRAPE_E_MEMORY;
+    if (l->def->plan)
+        s.count = lab_plan_sample(l, s.order);
+    for (json_int_t rank = 0; !l->def->plan && s.count < l->count; rank++)
+        for (size_t i = 0; i < l->count; i++)
+            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
+                s.order[s.count++] = i;
+    cases_name(l, name);
+    pthread_mutex_init(&s.lock, NULL);
+    atomic_init(&s.given_up, false);
+    for (size_t k = 0; k < s.count; k++)
+        if (lab_is_ours(l, s.order[k])) {
+            s.total++;
+            s.before += l->results[s.order[k]] != NULL;
+        }
+    s.done = s.before;
+    s.status = begin_lines(l, name, l->def->shard, l->def->shards, &s.file);
+    if (!s.status)
+        s.status = drape_file_publish(&s.file);
+    if (!s.status && s.done < s.total) {
+        while (started < l->def->jobs && !pthread_create(&threads[started], NULL, work, &s))
+            started++;
+        if (started == 0)
+            s.status = drape_fail(l->ctx, DRAPE_E_MEMORY, "no thread can be started");
+        for (int i = 0; i < started; i++)
+            pthread_join(threads[i], NULL);
+    }
+    drape_status closed = drape_file_close(&s.file);
+    drape_file_destroy(&s.file);
+    pthread_mutex_destroy(&s.lock);
+    return s.status ? s.status : closed;
 }
 
 /* ---- Planning ---- */
@@ -228,7 +467,7 @@ static bool ends_in(const char *name, const char *ending)
 static bool writes(const void *user, const char *name)
 {
     char cases[64];
-    lab_cases_name(user, cases);
+    cases_name(user, cases);
     return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
            strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
            ends_in(name, ".pdf") || strcmp(name, "tables.md") == 0 || strcmp(name, "plan.json") == 0;
@@ -281,7 +520,7 @@ static bool is_about(const void *user, const char *name)
 static drape_status prepare(lab *l)
 {
     l->input_is_good = false;
-    drape_status status = lab_read_lines(l, l->folder, &l->outcome->resumed);
+    drape_status status = read_lines(l, l->folder, &l->outcome->resumed);
     l->input_is_good = !status;
     if (!status && l->experiment->prepare)
         status = l->experiment->prepare(l);
@@ -461,7 +700,7 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
                            drape_lab_outcome *outcome)
 {
     static drape_status (*const stages[])(lab *) = {plan,         try_scene, check_settings, make_results,
-                                                    claim_folder, prepare,   lab_sweep,      report};
+                                                    claim_folder, prepare,   sweep_cases,    report};
     lab l;
     if (!outcome)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "an experiment needs an outcome");
@@ -481,32 +720,6 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
     return status;
 }
 
-static drape_status read_folders(lab *l, const char *const *folders, size_t count)
-{
-    drape_status status = parse_about(l, folders[0], &l->about);
-    if (status)
-        return status;
-    l->cases = json_object_get(l->about, "cases");
-    l->arguments = json_object_get(l->about, "arguments");
-    status = find(l, lab_text(l->about, "experiment"));
-    if (!status)
-        status = make_results(l);
-    if (!status && l->experiment->verify)
-        status = l->experiment->verify(l);
-    for (size_t i = 0; !status && i < count; i++) {
-        json_t *about = NULL;
-        status = parse_about(l, folders[i], &about);
-        if (!status && !is_same(about, l->about))
-            status =
-                drape_fail(l->ctx, DRAPE_E_ARGUMENT, "\"%.300s\" and \"%.300s\" hold different experiments",
-                           folders[0], folders[i]);
-        json_decref(about);
-        if (!status)
-            status = lab_read_lines(l, folders[i], &l->outcome->resumed);
-    }
-    return status;
-}
-
 drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, size_t count, const char *folder,
                              drape_lab_outcome *outcome)
 {
@@ -522,11 +735,29 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
     locale_t old = drape_locale_enter();
     drape_status status = begin(ctx, &def, folder, outcome, &l);
     if (!status)
-        status = read_folders(&l, folders, count);
+        status = parse_about(&l, folders[0], &l.about);
+    l.cases = json_object_get(l.about, "cases");
+    l.arguments = json_object_get(l.about, "arguments");
+    if (!status)
+        status = find(&l, lab_text(l.about, "experiment"));
+    if (!status)
+        status = make_results(&l);
+    if (!status && l.experiment->verify)
+        status = l.experiment->verify(&l);
+    for (size_t i = 0; !status && i < count; i++) {
+        json_t *about = NULL;
+        status = parse_about(&l, folders[i], &about);
+        if (!status && !is_same(about, l.about))
+            status = drape_fail(ctx, DRAPE_E_ARGUMENT, "\"%.300s\" and \"%.300s\" hold different experiments",
+                                folders[0], folders[i]);
+        json_decref(about);
+        if (!status)
+            status = read_lines(&l, folders[i], &outcome->resumed);
+    }
     if (!status)
         status = claim_folder(&l);
     if (!status)
-        status = lab_begin_lines(&l, "cases.jsonl", 1, 1, &file);
+        status = begin_lines(&l, "cases.jsonl", 1, 1, &file);
     if (!status)
         status = drape_file_finish(&file);
     if (!status)

@@ -42,12 +42,9 @@ static drape_status add_scene(lab *l, const lab_ivp *s)
 {
     lab_level steps[LEVELS];
     const lab_grid grid = {.scene = s->name,
-                           .rtols = rtols,
-                           .rtol_count = sizeof rtols / sizeof *rtols,
-                           .steps = steps,
-                           .step_count = LEVELS,
-                           .controlled = controlled,
-                           .controlled_count = sizeof controlled / sizeof *controlled,
+                           .rtols = LAB_LEVELS(rtols),
+                           .steps = LAB_LEVELS(steps),
+                           .controlled = LAB_LEVELS(controlled),
                            .first_step = s->interval / 64,
                            .only_if_implicit = true,
                            .add = add_tolerance,

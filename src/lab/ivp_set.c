@@ -402,76 +402,64 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
 
 /* ---- Export ---- */
 
-/* Each writes the contents of a file; v: velocities at the start. */
-
-static void put_start(const lab_ivp *s, const double *v, drape_file *file)
-{
-    (void)v;
-    drape_obj_put_nodes(file, drape_model_rest_positions(s->model), drape_model_node_count(s->model));
-    drape_obj_put_triangles(file, drape_model_triangles(s->model), drape_model_triangle_count(s->model));
-}
-
-static void put_nodes(const lab_ivp *s, const double *v, drape_file *file)
-{
-    const double *masses = drape_model_masses(s->model), *x = drape_model_rest_positions(s->model);
-    drape_file_print(file, "node,mass_kg,pinned,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s\n");
-    for (size_t i = 0; i < (size_t)drape_model_node_count(s->model); i++)
-        drape_file_print(file, "%zu,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, masses[i],
-                         drape_model_pinned(s->model)[i], x[3 * i], x[3 * i + 1], x[3 * i + 2], v[3 * i],
-                         v[3 * i + 1], v[3 * i + 2]);
-}
-
-/* Where pinned nodes are at the times: as the reference has them. */
-static void put_pins(const lab_ivp *s, const double *v, drape_file *file)
-{
-    const double *x = drape_model_rest_positions(s->model);
-    (void)v;
-    drape_file_print(file, "time_s,node,x_m,y_m,z_m\n");
-    for (size_t k = 0; k <= s->time_count; k++) {
-        for (size_t i = 0; i < (size_t)drape_model_node_count(s->model); i++)
-            if (drape_model_pinned(s->model)[i])
-                drape_file_print(file, "%.17g,%zu,%.17g,%.17g,%.17g\n", k ? s->times[k - 1] : 0, i, x[3 * i],
-                                 x[3 * i + 1], x[3 * i + 2]);
-        x = s->reference.x + s->reference.size * (k < s->time_count ? k : 0);
-    }
-}
-
-static void put_times(const lab_ivp *s, const double *v, drape_file *file)
-{
-    (void)v;
-    drape_file_print(file, "time_s\n");
-    for (size_t k = 0; k < s->time_count; k++)
-        drape_file_print(file, "%.17g\n", s->times[k]);
-}
-
-static drape_status copy(const lab_ivp *s, const char *from, drape_file *file)
-{
-    char *bytes;
-    size_t size;
-    drape_status status = from ? lab_read_text(s->arena, NULL, from, &bytes, &size) : DRAPE_E_MEMORY;
-    if (!status)
-        drape_file_put(file, bytes, size);
-    return status;
-}
-
 /* The files of the folder. */
-static const struct {
-    const char *name;
-    void (*put)(const lab_ivp *s, const double *v, drape_file *file);
-    const char *reference; /* without put: the copy of the reference with this ending; NULL: of the scene */
-} exports[] = {{"start.obj", put_start, NULL},  {"nodes.csv", put_nodes, NULL},
-               {"pins.csv", put_pins, NULL},    {"times.csv", put_times, NULL},
-               {"scene.json", NULL, NULL},      {"reference.npy", NULL, "npy"},
-               {"reference.json", NULL, "json"}};
-#define EXPORTS (sizeof exports / sizeof *exports)
+enum { START, NODES, PINS, TIMES, SCENE, REFERENCE, ABOUT, EXPORTS };
+static const char *const exports[EXPORTS] = {"start.obj",  "nodes.csv",     "pins.csv",      "times.csv",
+                                             "scene.json", "reference.npy", "reference.json"};
 
 static bool writes(const void *user, const char *name)
 {
     (void)user;
-    for (size_t i = 0; i < EXPORTS; i++)
-        if (strcmp(exports[i].name, name) == 0)
-            return true;
-    return false;
+    int i = 0;
+    while (i < EXPORTS && strcmp(exports[i], name) != 0)
+        i++;
+    return i < EXPORTS;
+}
+
+/* Puts the contents of a file; v: velocities at the start. */
+static drape_status put(const lab_ivp *s, const double *v, int which, drape_file *file)
+{
+    const double *masses = drape_model_masses(s->model), *x = drape_model_rest_positions(s->model);
+    const uint8_t *pinned = drape_model_pinned(s->model);
+    const size_t nodes = (size_t)drape_model_node_count(s->model);
+    const char *copied = s->path;
+    char *bytes;
+    size_t size;
+    switch (which) {
+    case START:
+        drape_obj_put_nodes(file, x, (int32_t)nodes);
+        drape_obj_put_triangles(file, drape_model_triangles(s->model), drape_model_triangle_count(s->model));
+        return DRAPE_OK;
+    case NODES:
+        drape_file_print(file, "node,mass_kg,pinned,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s\n");
+        for (size_t i = 0; i < nodes; i++)
+            drape_file_print(file, "%zu,%.17g,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, masses[i],
+                             pinned[i], x[3 * i], x[3 * i + 1], x[3 * i + 2], v[3 * i], v[3 * i + 1],
+                             v[3 * i + 2]);
+        return DRAPE_OK;
+    case PINS: /* where pinned nodes are at the times: as the reference has them */
+        drape_file_print(file, "time_s,node,x_m,y_m,z_m\n");
+        for (size_t k = 0; k <= s->time_count; k++) {
+            for (size_t i = 0; i < nodes; i++)
+                if (pinned[i])
+                    drape_file_print(file, "%.17g,%zu,%.17g,%.17g,%.17g\n", k ? s->times[k - 1] : 0, i,
+                                     x[3 * i], x[3 * i + 1], x[3 * i + 2]);
+            x = s->reference.x + s->reference.size * (k < s->time_count ? k : 0);
+        }
+        return DRAPE_OK;
+    case TIMES:
+        drape_file_print(file, "time_s\n");
+        for (size_t k = 0; k < s->time_count; k++)
+            drape_file_print(file, "%.17g\n", s->times[k]);
+        return DRAPE_OK;
+    case REFERENCE:
+    case ABOUT:
+        copied = lab_ivp_file(s, "references", which == ABOUT ? "json" : "npy");
+    }
+    drape_status status = copied ? lab_read_text(s->arena, NULL, copied, &bytes, &size) : DRAPE_E_MEMORY;
+    if (!status)
+        drape_file_put(file, bytes, size);
+    return status;
 }
 
 drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
@@ -487,14 +475,11 @@ drape_status lab_ivp_export(const lab_ivp *s, const char *path, FILE *out)
         status = drape_folder_check(folder, writes, writes, NULL);
     if (!status)
         status = drape_folder_begin(folder, writes, NULL);
-    for (size_t i = 0; !status && i < EXPORTS; i++) {
-        const char *ending = exports[i].reference;
+    for (int i = 0; !status && i < EXPORTS; i++) {
         drape_file file = {0};
-        status = drape_export_begin(s->arena->ctx, folder, exports[i].name, &file);
-        if (!status && exports[i].put)
-            exports[i].put(s, drape_sim_velocities(sim), &file);
-        else if (!status)
-            status = copy(s, ending ? lab_ivp_file(s, "references", ending) : s->path, &file);
+        status = drape_export_begin(s->arena->ctx, folder, exports[i], &file);
+        if (!status)
+            status = put(s, drape_sim_velocities(sim), i, &file);
         if (!status)
             status = drape_file_finish(&file);
         drape_file_destroy(&file);

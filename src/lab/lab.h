@@ -109,8 +109,11 @@ struct lab {
 /* Adds a case of rank 0. Takes the references of tags and settings. same_as < 0: none. */
 drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as);
 
-/* Sets the rank of the case that was added last: cases of low rank are run first. */
-void lab_rank_case(lab *l, int rank);
+/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared with. */
+lab_request lab_request_of(const lab *l, size_t index);
+
+/* Adds an object as a line. */
+void lab_put_line(drape_file *file, const json_t *object);
 
 /* A number or text of an object; NaN and "" where there is none. */
 double lab_number(const json_t *object, const char *key);
@@ -161,33 +164,6 @@ drape_status lab_try(drape_context *ctx, const lab_request *request);
  * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED
  * (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
-
-/* ---- sweep.c: the cases, run by several threads into a file of lines ----
- *
- * A case that has a line is not run again; a line that a kill cut short is dropped, and its case is run again. */
-
-/* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay.
- * *found counts the new ones. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a whole line that is not a result of
- * this experiment), DRAPE_E_MEMORY. */
-drape_status lab_read_lines(lab *l, const char *folder, int64_t *found);
-
-/* Adds an object as a line. */
-void lab_put_line(drape_file *file, const json_t *object);
-
-/* The name of the file of lines that this process writes. */
-void lab_cases_name(const lab *l, char name[64]);
-
-/* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller
- * destroys it in any case. */
-drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file);
-
-/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
- * with. */
-lab_request lab_request_of(const lab *l, size_t index);
-
-/* Runs the cases of this shard that have no result; each becomes a line as soon as it is done. Errors: those
- * of lab_run, DRAPE_E_FILE, DRAPE_E_STOPPED. */
-drape_status lab_sweep(lab *l);
 
 /* ---- plan.c: what a sweep will take, from a sample of its cases: CPU time, time on free cores, memory, disk ---- */
 

@@ -24,8 +24,12 @@ drape_status lab_add_point(lab *l, const lab_point *p)
         json_object_update(settings, p->more);
     json_decref(p->more);
     drape_status status = lab_add_case(l, tags, settings, -1);
-    if (!status && p->level.rank >= 0)
-        lab_rank_case(l, 2 * p->level.rank + (lab_find_integrator(p->integrator)->stability != NULL));
+    if (!status &&
+        p->level.rank >= 0) { /* cases of low rank are run first; of equal rank, explicit integrators last */
+        const int rank = 2 * p->level.rank + (lab_find_integrator(p->integrator)->stability != NULL);
+        json_object_set_new(json_array_get(l->cases, json_array_size(l->cases) - 1), "rank",
+                            json_integer(rank));
+    }
     return status;
 }
 
@@ -33,8 +37,7 @@ drape_status lab_add_point(lab *l, const lab_point *p)
 static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
 {
     const bool own = integrator->own_steps;
-    const lab_level *levels = own ? g->rtols : g->steps;
-    const size_t count = own ? g->rtol_count : g->step_count;
+    const lab_levels levels = own ? g->rtols : g->steps;
     drape_status status = DRAPE_OK;
     /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it; otherwise 0,
      * for none, alone. */
@@ -45,15 +48,15 @@ static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_
     for (size_t k = 0; k < (chosen ? 1 : 2); k++) {
         char series[96];
         snprintf(series, sizeof series, limits[k] ? "%s, order %d" : "%s", integrator->entry.name, limits[k]);
-        for (size_t i = 0; !status && i < count; i++) {
+        for (size_t i = 0; !status && i < levels.count; i++) {
             json_t *more = json_object();
             if (limits[k])
                 json_object_set_new(more, "/integrator/max_order", json_integer(limits[k]));
             if (!own && g->add)
-                g->add(g->user, integrator, levels[i].value, 0, more);
+                g->add(g->user, integrator, levels.at[i].value, 0, more);
             status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
                                                    own ? "/integrator/rtol" : "/integrator/dt", g->knob,
-                                                   levels[i], more});
+                                                   levels.at[i], more});
         }
     }
     return status;
@@ -68,13 +71,13 @@ static drape_status add_controlled(lab *l, const lab_grid *g, const drape_integr
         if (!lab_has_param(controller, "rtol"))
             continue;
         snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
-        for (size_t i = 0; !status && i < g->controlled_count; i++) {
+        for (size_t i = 0; !status && i < g->controlled.count; i++) {
             json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
                                      g->first_step);
             if (g->add)
-                g->add(g->user, integrator, NAN, g->controlled[i].value, more);
+                g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
             status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
-                                                   "/controller/rtol", NULL, g->controlled[i], more});
+                                                   "/controller/rtol", NULL, g->controlled.at[i], more});
         }
     }
     return status;

@@ -16,6 +16,17 @@ typedef struct lab_level {
     int rank; /* below 0: as 0 */
 } lab_level;
 
+typedef struct lab_levels {
+    const lab_level *at;
+    size_t count;
+} lab_levels;
+
+/* Those of an array. */
+#define LAB_LEVELS(array)                                                                                    \
+    {                                                                                                        \
+        array, sizeof(array) / sizeof *(array)                                                               \
+    }
+
 /* A case. */
 typedef struct lab_point {
     const char *scene; /* its name; NULL: there is only one */
@@ -33,8 +44,7 @@ drape_status lab_add_point(lab *l, const lab_point *point);
  * are limited to; others over dt, and over rtol under each controller that bounds an error. */
 typedef struct lab_grid {
     const char *scene, *knob; /* as of a point */
-    const lab_level *rtols, *steps, *controlled;
-    size_t rtol_count, step_count, controlled_count;
+    lab_levels rtols, steps, controlled;
     double first_step;     /* [s] dt under a controller */
     bool only_if_implicit; /* no controllers for explicit integrators */
     /* Adds settings of a method of fixed steps, dt or, under a controller with rtol, dt = NAN. NULL: there

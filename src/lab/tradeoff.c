@@ -31,12 +31,9 @@ static const lab_level steps[] = {{1.0 / 30, 3},  {1.0 / 60, 0},  {1.0 / 120, 3}
 static const lab_level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
                                   {3e-4, 4}, {1e-4, 1}, {1e-5, 3}, {1e-6, 5}};
 static const lab_level controlled[] = {{1e-2, 6}, {1e-3, 5}, {1e-4, 7}};
-static const lab_grid grid = {.rtols = rtols,
-                              .rtol_count = sizeof rtols / sizeof *rtols,
-                              .steps = steps,
-                              .step_count = sizeof steps / sizeof *steps,
-                              .controlled = controlled,
-                              .controlled_count = sizeof controlled / sizeof *controlled,
+static const lab_grid grid = {.rtols = LAB_LEVELS(rtols),
+                              .steps = LAB_LEVELS(steps),
+                              .controlled = LAB_LEVELS(controlled),
                               .first_step = 1.0 / 480};
 
 static drape_status plan(lab *l)
