@@ -9,7 +9,6 @@
  * the tolerance; a method that chooses its order takes another one at another rtol, and no line is fitted.
  */
 #include "lab/series.h"
-#include "lab/statistics.h"
 #include "lab/text.h"
 #include "model/scene.h"
 

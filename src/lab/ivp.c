@@ -5,7 +5,6 @@
  */
 #include "lab/ivp.h"
 #include "lab/series.h"
-#include "lab/statistics.h"
 #include "lab/text.h"
 
 #include <math.h>

@@ -190,21 +190,6 @@ static drape_status store(const lab_ivp *s, const attempt *attempts, int count, 
     return status;
 }
 
-static drape_status compare(lab_ivp *s, const attempt *best, double error, FILE *out)
-{
-    drape_status status = lab_ivp_read_reference(s);
-    if (status)
-        return status;
-    const double distance = lab_ivp_distance(s, &s->reference, &best->best), allowed = s->error + error;
-    fprintf(out, "stored    differs by %.2g of the size; its error is %.2g\n", distance, s->error);
-    return distance <= allowed
-               ? DRAPE_OK
-               : drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
-                            "%.300s: the stored reference differs by %.2g of the size from the "
-                            "one computed now; both errors together are %.2g",
-                            s->path, distance, allowed);
-}
-
 drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out)
 {
     attempt attempts[FAMILIES];
@@ -247,7 +232,19 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
             s->path, error, goal);
     fprintf(out, "reference %s, agrees with another family to %.2g of the size\n", best->family->method,
             error);
-    return check ? compare(s, best, error, out) : store(s, attempts, count, best, error);
+    if (!check)
+        return store(s, attempts, count, best, error);
+    status = lab_ivp_read_reference(s);
+    if (status)
+        return status;
+    const double distance = lab_ivp_distance(s, &s->reference, &best->best), allowed = s->error + error;
+    fprintf(out, "stored    differs by %.2g of the size; its error is %.2g\n", distance, s->error);
+    return distance <= allowed
+               ? DRAPE_OK
+               : drape_fail(s->arena->ctx, DRAPE_E_SOLVER,
+                            "%.300s: the stored reference differs by %.2g of the size from the "
+                            "one computed now; both errors together are %.2g",
+                            s->path, distance, allowed);
 }
 
 /* ---- How fast a small perturbation of the start grows ----
@@ -289,21 +286,6 @@ static void perturb(const lab_ivp *s, int direction, double *x)
     }
 }
 
-/* The motion from the start, perturbed in a direction or, 0, not. */
-static drape_status start(const lab_ivp *s, const drape_model *model, int direction, double *x,
-                          drape_sim **sim)
-{
-    const size_t size = 3 * (size_t)drape_model_node_count(model);
-    drape_status status = drape_sim_create(s->arena->ctx, model, NULL, sim);
-    if (status)
-        return status;
-    for (size_t i = 0; i < size; i++)
-        x[i] = drape_sim_positions(*sim)[i];
-    if (direction)
-        perturb(s, direction, x);
-    return drape_sim_set_state(*sim, 0, x, drape_sim_velocities(*sim));
-}
-
 /* Growth at each sample, the largest of the directions. Returns how many samples all runs reached. */
 static drape_status measure(const lab_ivp *s, const drape_model *model, const double *t, double *growth,
                             size_t *reached)
@@ -312,8 +294,15 @@ static drape_status measure(const lab_ivp *s, const drape_model *model, const do
     double *x = drape_arena_take(s->arena, size, sizeof *x);
     drape_sim *sims[DIRECTIONS + 1] = {NULL};
     drape_status status = x ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (int d = 0; !status && d <= DIRECTIONS; d++)
-        status = start(s, model, d, x, &sims[d]);
+    for (int d = 0; !status && d <= DIRECTIONS; d++) { /* the first one is not perturbed */
+        status = drape_sim_create(s->arena->ctx, model, NULL, &sims[d]);
+        if (status)
+            break;
+        memcpy(x, drape_sim_positions(sims[d]), size * sizeof *x);
+        if (d)
+            perturb(s, d, x);
+        status = drape_sim_set_state(sims[d], 0, x, drape_sim_velocities(sims[d]));
+    }
     bool running = !status;
     for (*reached = 0; running && *reached < SAMPLES; *reached += running) {
         for (int d = 0; running && d <= DIRECTIONS; d++) {
@@ -348,18 +337,9 @@ static drape_status choose_method(const lab_ivp *s, json_t **settings)
     return status;
 }
 
-/* The last time before the growth passes the limit; INFINITY: it does not. */
-static double find_horizon(const double *t, const double *growth, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (!(growth[i] < LIMIT))
-            return i ? t[i - 1] : 0;
-    return INFINITY;
-}
-
 drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
 {
-    double t[SAMPLES], growth[SAMPLES] = {0}, largest = 0;
+    double t[SAMPLES], growth[SAMPLES] = {0}, largest = 0, horizon = INFINITY;
     const double duration = drape_model_duration(s->model);
     size_t count = 0;
     drape_model *model = NULL;
@@ -373,7 +353,9 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
         status = measure(s, model, t, growth, &count);
     for (size_t i = 0; i < count && t[i] <= duration * (1 + 1e-9); i++)
         largest = fmax(largest, growth[i]);
-    const double horizon = find_horizon(t, growth, count);
+    for (size_t i = count; i-- > 0;)
+        if (!(growth[i] < LIMIT)) /* the last time before the growth passes the limit */
+            horizon = i ? t[i - 1] : 0;
     *within =
         !status && count > 0 && t[count - 1] >= duration * (1 - 1e-9) && horizon >= duration * (1 - 1e-9);
     if (!status) {

@@ -12,7 +12,7 @@
  */
 #include "lab/lab.h"
 
-#include "lab/statistics.h"
+#include "lab/series.h"
 #include "lab/text.h"
 
 #include <math.h>

@@ -1,6 +1,5 @@
 /* reference_beams.c: strips clamped horizontally at one end, at rest under loads, against rods. Without
  * lateral contraction (nu = 0) strip and rod are the same. */
-#include "lab/rod.h"
 #include "lab/sheet.h"
 
 #include <math.h>

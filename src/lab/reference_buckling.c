@@ -1,6 +1,5 @@
 /* reference_buckling.c: loads at which strips buckle. Where nothing disturbs them they stay straight, and the
  * signs of the eigenvalues of the Hessian say whether that equilibrium is stable. */
-#include "lab/rod.h"
 #include "lab/sheet.h"
 
 #include <gsl/gsl_errno.h>

@@ -1,5 +1,4 @@
 /* reference_cables.c: heavy strips that hardly resist bending: a catenary, and a hanging chain. */
-#include "lab/rod.h"
 #include "lab/sheet.h"
 
 #include <gsl/gsl_sf_bessel.h>

@@ -2,7 +2,6 @@
  * back the published values. A case is a fabric number in the table. */
 #include "compile/fabrics.h"
 #include "compile/fabrics_table.h"
-#include "lab/rod.h"
 #include "lab/sheet.h"
 
 #include <gsl/gsl_integration.h>

@@ -1,10 +1,10 @@
 /*
- * rod.c: see rod.h. With t from the free end and psi the angle from the vertical,
+ * rod.c: see sheet.h. With t from the free end and psi the angle from the vertical,
  *     psi'' = (G t + P) sin psi,  psi'(0) = 0,  psi(1) = pi/2,  drop = int cos psi,  reach = int sin psi.
  * psi(0) is as small as exp(-G^(1/2)); it is sought by its logarithm, on which psi(1) depends smoothly, so
  * shooting from the free end loses no digits.
  */
-#include "lab/rod.h"
+#include "lab/sheet.h"
 
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_odeiv2.h>

@@ -189,7 +189,7 @@ static GLuint program(drape_context *ctx, const char *name, const char *vertex, 
                             (const char *const[]){first, second, NULL});
 }
 
-static drape_status create_all(drape_painter *p, const drape_painter_def *def)
+drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *def, drape_painter **out)
 {
     static const int sizes[] = {3, 3, 0};
     static const float square[] = {-1, 0, 1, 0, 1, 0, 1, 0, 1,  0, 1, 0, 1,  0, -1, 0, 1, 0,
@@ -197,39 +197,34 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     static const char *const body[] = {body_source, surface_main, NULL};
     static const char *const ground[] = {wall_source, ground_source, NULL};
     const char *const paths[] = {def->pattern, def->heights, def->environment};
-    drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
+    drape_painter *p = *out = drape_alloc(ctx, 1, sizeof *p);
+    if (!p)
+        return DRAPE_E_MEMORY;
+    p->ctx = ctx;
+    p->arena = drape_arena_of(ctx);
+    drape_status status = drape_canvas_create(ctx, def->width, def->height, &p->canvas);
     if (!status)
         status = drape_overlay_create(&p->arena, def->width, def->height, def->fine, &p->overlay);
     if (!status)
-        status = drape_lighting_create(p->ctx, def->width, def->height, &p->lighting);
+        status = drape_lighting_create(ctx, def->width, def->height, &p->lighting);
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
-            status = drape_texture(p->ctx, (drape_texture_kind)i, paths[i], &p->textures[i]);
-    if (!status && !((p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
-                     (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
-                     (p->body = surface_program(p->ctx, "body", body)) &&
-                     (p->ground = surface_program(p->ctx, "ground", ground)) &&
-                     (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
-                     (p->wire = program(p->ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
-                     (p->pin = program(p->ctx, "pin", pin_vertex, pin_fragment, NULL))))
+            status = drape_texture(ctx, (drape_texture_kind)i, paths[i], &p->textures[i]);
+    if (!status && !((p->depth = program(ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
+                     (p->seen = program(ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
+                     (p->body = surface_program(ctx, "body", body)) &&
+                     (p->ground = surface_program(ctx, "ground", ground)) &&
+                     (p->wall = program(ctx, "wall", wall_vertex, wall_source, wall_main)) &&
+                     (p->wire = program(ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
+                     (p->pin = program(ctx, "pin", pin_vertex, pin_fragment, NULL))))
         status = DRAPE_E_FILE;
-    if (status)
-        return status;
-    p->ramp = drape_texture_ramp();
-    glGenVertexArrays(1, &p->empty);
-    drape_gl_mesh_create(&p->floor, sizes, false);
-    drape_gl_mesh_fill(&p->floor, square, 6, false);
-    return drape_gl_check(p->ctx, "set up drawing");
-}
-
-drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *def, drape_painter **out)
-{
-    *out = drape_alloc(ctx, 1, sizeof **out);
-    if (!*out)
-        return DRAPE_E_MEMORY;
-    (*out)->ctx = ctx;
-    (*out)->arena = drape_arena_of(ctx);
-    drape_status status = create_all(*out, def);
+    if (!status) {
+        p->ramp = drape_texture_ramp();
+        glGenVertexArrays(1, &p->empty);
+        drape_gl_mesh_create(&p->floor, sizes, false);
+        drape_gl_mesh_fill(&p->floor, square, 6, false);
+        status = drape_gl_check(ctx, "set up drawing");
+    }
     if (status)
         drape_painter_destroy(out);
     return status;

@@ -300,31 +300,6 @@ static float distance(const float *a, const float *b)
     return sqrtf(drape_dot(difference, difference));
 }
 
-/* Adds a triangle to the normals and tangents of its corners, weighted by area: the cross product of two
- * sides has twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over
- * the determinant of the texture coordinates, of which only the sign matters. */
-static void add_triangle(drape_skin *s, const float *x, const int32_t *corner)
-{
-    const float *uv[3];
-    float e1[3], e2[3], normal[3], along[3];
-    for (int k = 0; k < 3; k++)
-        uv[k] = s->uv + 2 * (size_t)corner[k];
-    subtract(x + 3 * (size_t)corner[1], x + 3 * (size_t)corner[0], e1);
-    subtract(x + 3 * (size_t)corner[2], x + 3 * (size_t)corner[0], e2);
-    drape_cross(e1, e2, normal);
-    float du1 = uv[1][0] - uv[0][0], dv1 = uv[1][1] - uv[0][1];
-    float du2 = uv[2][0] - uv[0][0], dv2 = uv[2][1] - uv[0][1];
-    float sign = du1 * dv2 - du2 * dv1 < 0 ? -1.0f : 1.0f, area = sqrtf(drape_dot(normal, normal));
-    for (int k = 0; k < 3; k++)
-        along[k] = sign * (e1[k] * dv2 - e2[k] * dv1);
-    drape_normalize(along);
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++) {
-            s->normal[3 * (size_t)corner[c] + (size_t)k] += normal[k];
-            s->tangent[3 * (size_t)corner[c] + (size_t)k] += area * along[k];
-        }
-}
-
 /* Makes a unit tangent orthogonal to the normal. */
 static void orthogonalize(const float *normal, float *tangent)
 {
@@ -334,12 +309,31 @@ static void orthogonalize(const float *normal, float *tangent)
     drape_normalize(tangent);
 }
 
+/* A triangle is added to the normals and tangents of its corners weighted by area: the cross product of two sides has
+ * twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over the determinant of
+ * the texture coordinates, of which only the sign matters. */
 static void update_nodes(drape_skin *s, const float *x, const float *values)
 {
     memset(s->normal, 0, 3 * (size_t)s->node_count * sizeof *s->normal);
     memset(s->tangent, 0, 3 * (size_t)s->node_count * sizeof *s->tangent);
-    for (int32_t t = 0; t < s->triangle_count; t++)
-        add_triangle(s, x, s->triangle + 3 * (size_t)t);
+    for (size_t t = 0; t < (size_t)s->triangle_count; t++) {
+        const int32_t *corner = s->triangle + 3 * t;
+        const size_t a = (size_t)corner[0], b = (size_t)corner[1], c = (size_t)corner[2];
+        const float *uv = s->uv + 2 * a, *uv1 = s->uv + 2 * b, *uv2 = s->uv + 2 * c;
+        float e1[3], e2[3], normal[3], along[3];
+        subtract(x + 3 * b, x + 3 * a, e1);
+        subtract(x + 3 * c, x + 3 * a, e2);
+        drape_cross(e1, e2, normal);
+        float du1 = uv1[0] - uv[0], dv1 = uv1[1] - uv[1], du2 = uv2[0] - uv[0], dv2 = uv2[1] - uv[1];
+        float sign = du1 * dv2 - du2 * dv1 < 0 ? -1.0f : 1.0f, area = sqrtf(drape_dot(normal, normal));
+        for (int k = 0; k < 3; k++)
+            along[k] = sign * (e1[k] * dv2 - e2[k] * dv1);
+        drape_normalize(along);
+        for (size_t i = 0; i < 9; i++) {
+            s->normal[3 * (size_t)corner[i / 3] + i % 3] += normal[i % 3];
+            s->tangent[3 * (size_t)corner[i / 3] + i % 3] += area * along[i % 3];
+        }
+    }
     for (size_t i = 0; i < (size_t)s->node_count; i++) {
         drape_skin_vertex *v = &s->vertex[i];
         drape_normalize(s->normal + 3 * i);

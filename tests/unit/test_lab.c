@@ -1,5 +1,5 @@
 /* test_lab.c: the measures of experiments: fitted powers, material points on other meshes, distances. */
-#include "lab/statistics.h"
+#include "lab/series.h"
 #include "lab/text.h"
 #include "lab/trace.h"
 #include "support/suite.h"
