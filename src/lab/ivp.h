@@ -55,22 +55,6 @@ bool lab_ivp_admits(const lab_ivp *s, const drape_integrator_ops *integrator);
 /* A bound on the residual of a node [N] under which what Newton's method leaves in each step is small beside
  * the error of a method of that order with steps of dt: it falls as dt^order. */
 double lab_ivp_tolerance(const lab_ivp *s, int order, double dt);
-double lab_ivp_least_tolerance(const lab_ivp *s); /* near rounding */
-
-/* Compiles the scene with settings {pointer: value}. Errors: those of loading. */
-drape_status lab_ivp_load(const lab_ivp *s, const json_t *settings, drape_model **model);
-
-/* A step of which so many or, of an explicit method, as many times 2^k as keep it below a quarter of its
- * stability limit at the start, make up an interval. Errors: those of running. */
-drape_status lab_ivp_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt);
-
-/* Runs the scene with settings {pointer: value}, which this takes, and records it at the times. A run that
- * takes more CPU seconds than that, or fails, leaves no frames: *result says why and is to be freed. Errors:
- * those of lab_run. */
-drape_status lab_ivp_run(const lab_ivp *s, json_t *settings, double seconds, lab_trace *out, json_t **result);
-
-/* The largest distance over the times of two motions, relative to the size. */
-double lab_ivp_distance(const lab_ivp *s, const lab_trace *a, const lab_trace *b);
 
 /* Computes the reference with every family of methods that the build has and that admits the scene, and
  * prints what each reached. seconds: CPU time that a family may take. check: compares it with the one that
@@ -91,18 +75,5 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
 /* Writes what another program needs into a folder: start.obj, nodes.csv, pins.csv, times.csv, scene.json,
  * reference.npy. Errors: DRAPE_E_FILE, DRAPE_E_ARGUMENT (the folder has files of others). */
 drape_status lab_ivp_export(const lab_ivp *s, const char *folder, FILE *out);
-
-/* ---- For the files of the set ---- */
-
-/* "DIR/KIND/NAME.ENDING" in the arena; NULL: out of memory. */
-char *lab_ivp_file(const lab_ivp *s, const char *kind, const char *ending);
-
-/* Writes a file, and its folder if there is none. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status lab_ivp_write(const lab_ivp *s, const char *path, const char *head, size_t head_size,
-                           const void *data, size_t size);
-drape_status lab_ivp_write_json(const lab_ivp *s, const char *path, const json_t *object);
-
-/* "scene", "scene_hash", "drape" and "date" of a file of the set; NULL: out of memory. */
-json_t *lab_ivp_provenance(const lab_ivp *s);
 
 #endif

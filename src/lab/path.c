@@ -258,18 +258,6 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
     return status ? status : examine(p, point);
 }
 
-/* The step so far, shortened to end at the last factor. */
-static drape_status end_at(follower *p, drape_path_point *point)
-{
-    const double share = (p->def->to - p->point.factor) / p->change;
-    const double limit = limit_of(p);
-    for (size_t i = 0; i < p->n; i++)
-        p->step[i] *= share;
-    p->change = p->def->to - p->point.factor;
-    drape_status status = correct(p, CONTROL_LOAD, limit, point);
-    return status ? status : examine(p, point);
-}
-
 /* ---- A branch ---- */
 
 /* The mode of K at the last point whose eigenvalue is nearest to 0, by inverse iteration, in M. */
@@ -384,8 +372,14 @@ static drape_status follow(follower *p)
         drape_status tried = attempt(p, length, &point);
         const double left = p->def->to - p->point.factor;
         const bool last = !tried && left != 0 && p->change * left > 0 && fabs(p->change) >= fabs(left);
+        const double share = (p->def->to - p->point.factor) / p->change;
+        const double limit = limit_of(p);
+        for (size_t i = 0; i < p->n; i++)
+            p->step[i] *= share;
+        p->change = p->def->to - p->point.factor;
+        status = correct(p, CONTROL_LOAD, limit, &point);
         if (last)
-            tried = end_at(p, &point);
+            tried = (status ? status : examine(p, &point));
         if (tried < 0)
             return tried;
         if (tried) {

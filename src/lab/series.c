@@ -35,8 +35,7 @@ drape_status lab_add_point(lab *l, const lab_point *p)
     return status;
 }
 
-/* Each series has one limit of the order: a line through points of different limits has no meaning. */
-static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
+drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
 {
     const bool own = integrator->own_steps;
     const lab_levels levels = own ? g->rtols : g->steps;
@@ -61,35 +60,25 @@ static drape_status add_alone(lab *l, const lab_grid *g, const drape_integrator_
                                                    levels.at[i], more});
         }
     }
-    return status;
-}
-
-static drape_status add_controlled(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
-{
-    drape_status status = DRAPE_OK;
-    for (int c = 0; drape_controllers[c]; c++) {
-        const drape_entry *controller = &drape_controllers[c]->entry;
-        char series[96];
-        if (!lab_has_param(controller, "rtol"))
-            continue;
-        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
-        for (size_t i = 0; !status && i < g->controlled.count; i++) {
-            json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
-                                     g->first_step);
-            if (g->add)
-                g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
-            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
-                                                   "/controller/rtol", NULL, g->controlled.at[i], more});
+    if (!status && !integrator->own_steps && !(g->only_if_implicit && integrator->stability)) {
+        status = DRAPE_OK;
+        for (int c = 0; drape_controllers[c]; c++) {
+            const drape_entry *controller = &drape_controllers[c]->entry;
+            char series[96];
+            if (!lab_has_param(controller, "rtol"))
+                continue;
+            snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
+            for (size_t i = 0; !status && i < g->controlled.count; i++) {
+                json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
+                                         g->first_step);
+                if (g->add)
+                    g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
+                status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
+                                                       "/controller/rtol", NULL, g->controlled.at[i], more});
+            }
         }
+        status = status;
     }
-    return status;
-}
-
-drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
-{
-    drape_status status = add_alone(l, g, integrator);
-    if (!status && !integrator->own_steps && !(g->only_if_implicit && integrator->stability))
-        status = add_controlled(l, g, integrator);
     return status;
 }
 

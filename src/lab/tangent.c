@@ -44,22 +44,6 @@ static void take_free(const drape_model *m, const double *nodes, double *free)
         memcpy(free + 3 * (size_t)f, nodes + 3 * (size_t)m->node_of_free[f], 3 * sizeof *free);
 }
 
-/* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be
- * symmetric after all, as under the pressure on cloth that is pinned all round. */
-static drape_status check_potential(const lab_tangent *t, const drape_point *point)
-{
-    if (!t->follows)
-        return DRAPE_OK;
-    drape_system_jacobian_without(t->system, point, 0, 0, t->potential, t->scratch);
-    const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
-    return asymmetry > MAX_ASYMMETRY
-               ? drape_fail(t->ctx, DRAPE_E_ARGUMENT,
-                            "the stiffness of a load that follows the cloth is not symmetric, by %.2g of its "
-                            "largest entry: modes are only computed of loads with a potential",
-                            asymmetry)
-               : DRAPE_OK;
-}
-
 static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_potential)
 {
     const drape_model *m = t->sim->model;
@@ -91,7 +75,18 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_po
         lab_tangent_is_symmetric(t, t->values);
     else
         drape_system_symmetrize(t->system, &point, 0, t->values);
-    return needs_potential ? check_potential(t, &point) : DRAPE_OK;
+    if (!needs_potential || !t->follows)
+        return DRAPE_OK;
+    /* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be symmetric after
+     * all, as under the pressure on cloth that is pinned all round. */
+    drape_system_jacobian_without(t->system, &point, 0, 0, t->potential, t->scratch);
+    const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
+    return asymmetry > MAX_ASYMMETRY
+               ? drape_fail(t->ctx, DRAPE_E_ARGUMENT,
+                            "the stiffness of a load that follows the cloth is not symmetric, by %.2g of its "
+                            "largest entry: modes are only computed of loads with a potential",
+                            asymmetry)
+               : DRAPE_OK;
 }
 
 drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, bool needs_potential,
