@@ -202,41 +202,36 @@ static double local_order(const sequence *s, size_t i)
     return log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]);
 }
 
-/* Why there is no line. */
-static void report_no_order(const sequence *s, FILE *out)
-{
-    double low = INFINITY, high = -INFINITY; /* of the orders between neighbours */
-    for (size_t i = 1; i < s->count; i++) {
-        low = fmin(low, local_order(s, i));
-        high = fmax(high, local_order(s, i));
-    }
-    fprintf(out, "no order, as ");
-    if (s->unrefined)
-        fprintf(out, "it chooses its own substeps and dt does not refine them; a value of "
-                     "/integrator/substeps fixes them");
-    else if (s->count < 2)
-        fprintf(out, "too few of its refinements moved the end");
-    else if (s->chooses_order)
-        fprintf(
-            out,
-            "it chooses its order, and another one at another rtol; a tenth of rtol divides the change by "
-            "%.2g to %.2g%s",
-            pow(10, low), pow(10, high),
-            strcmp(s->knob, BY_RTOL) == 0 ? "; a value of /integrator/order fixes it" : "");
-    else
-        fprintf(
-            out,
-            "it changes from refinement to refinement, between %.2g and %.2g, %.2g at the last: the order "
-            "is not determined; try more levels, or a shorter duration, before small differences grow",
-            low, high, local_order(s, s->count - 1));
-}
-
 static void report_order(const sequence *s, FILE *out)
 {
     fprintf(out, "%s: ", s->series);
-    if (isnan(s->line.slope))
-        report_no_order(s, out);
-    else {
+    if (isnan(s->line.slope)) {
+        double low = INFINITY, high = -INFINITY; /* of the orders between neighbours */
+        for (size_t i = 1; i < s->count; i++) {
+            low = fmin(low, local_order(s, i));
+            high = fmax(high, local_order(s, i));
+        }
+        fprintf(out, "no order, as ");
+        if (s->unrefined)
+            fprintf(out, "it chooses its own substeps and dt does not refine them; a value of "
+                         "/integrator/substeps fixes them");
+        else if (s->count < 2)
+            fprintf(out, "too few of its refinements moved the end");
+        else if (s->chooses_order)
+            fprintf(out,
+                    "it chooses its order, and another one at another rtol; a tenth of rtol divides the "
+                    "change by "
+                    "%.2g to %.2g%s",
+                    pow(10, low), pow(10, high),
+                    strcmp(s->knob, BY_RTOL) == 0 ? "; a value of /integrator/order fixes it" : "");
+        else
+            fprintf(
+                out,
+                "it changes from refinement to refinement, between %.2g and %.2g, %.2g at the last: the "
+                "order "
+                "is not determined; try more levels, or a shorter duration, before small differences grow",
+                low, high, local_order(s, s->count - 1));
+    } else {
         if (is_tolerance(s))
             fprintf(out, "change proportional to %s^%.3g", s->knob, s->line.slope);
         else

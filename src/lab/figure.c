@@ -513,26 +513,6 @@ static bool has_scale(const lab_figure *f)
     return f->scale.to > f->scale.from;
 }
 
-static layout lay_out(const lab_figure *f)
-{
-    double widest = 0;
-    for (int i = 0; i < f->entries; i++)
-        widest = fmax(widest, fmin(WIDTH - 2 - SAMPLE, text_width(f->legend[i].text)));
-    layout at = {.column = SAMPLE + widest + GAP};
-    at.columns = (int)fmax(1, fmin(f->entries, floor((WIDTH - 2 + GAP) / at.column)));
-    at.rows = (f->entries + at.columns - 1) / at.columns;
-    double ticks = text_width(f->axes[1].log ? "10-10" : "0.0005"); /* numbers or names of the y axis */
-    for (int i = 0; i < f->axes[1].name_count; i++)
-        ticks = fmax(i ? ticks : 0, text_width(f->axes[1].names[i]));
-    at.left = (*f->axes[1].label ? EM + 1.5 : 1) + fmin(ticks, WIDEST_NAME) + TICK + 1;
-    at.legend = LINE * at.rows + 1;
-    at.scale = at.legend + EM + 1 + 1.5 * EM + TICK;
-    at.bottom =
-        TICK + 1.5 * EM + (*f->axes[0].label ? EM + 1 : 0) + (has_scale(f) ? at.scale + BAR : at.legend);
-    at.height = at.bottom + f->plot_height + TOP + (*f->title ? TITLE : 0);
-    return at;
-}
-
 /* ---- Drawing ---- */
 
 static void put_legend(const lab_figure *f, const layout *at, const page *p)
@@ -653,7 +633,21 @@ static cairo_status_t put_bytes(void *out, const unsigned char *data, unsigned s
 static drape_status write_figure(lab *l, const lab_figure *f, const char *ending, const char *caption,
                                  cairo_surface_t *make(cairo_write_func_t, void *, double, double))
 {
-    const layout at = lay_out(f);
+    double widest = 0; /* text of the legend, which has as many columns as fit */
+    for (int i = 0; i < f->entries; i++)
+        widest = fmax(widest, fmin(WIDTH - 2 - SAMPLE, text_width(f->legend[i].text)));
+    layout at = {.column = SAMPLE + widest + GAP};
+    at.columns = (int)fmax(1, fmin(f->entries, floor((WIDTH - 2 + GAP) / at.column)));
+    at.rows = (f->entries + at.columns - 1) / at.columns;
+    double ticks = text_width(f->axes[1].log ? "10-10" : "0.0005"); /* numbers or names of the y axis */
+    for (int i = 0; i < f->axes[1].name_count; i++)
+        ticks = fmax(i ? ticks : 0, text_width(f->axes[1].names[i]));
+    at.left = (*f->axes[1].label ? EM + 1.5 : 1) + fmin(ticks, WIDEST_NAME) + TICK + 1;
+    at.legend = LINE * at.rows + 1;
+    at.scale = at.legend + EM + 1 + 1.5 * EM + TICK;
+    at.bottom =
+        TICK + 1.5 * EM + (*f->axes[0].label ? EM + 1 : 0) + (has_scale(f) ? at.scale + BAR : at.legend);
+    at.height = at.bottom + f->plot_height + TOP + (*f->title ? TITLE : 0);
     char name[sizeof f->name + 4], *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);

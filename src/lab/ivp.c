@@ -209,21 +209,6 @@ static void put_cheapest(const lab_table *t, const scene *s, double error)
     lab_table_row(t, "%s\t%s, %s (%.2g s)\t%s\t%s", s->name, best->name, knob, least, other, usual);
 }
 
-static void tabulate_cheapest(const tables *all)
-{
-    const lab_table *t = &all->table;
-    for (int decade = -2; decade >= -4; decade--) {
-        char title[96];
-        snprintf(title, sizeof title, "At an error of 1e%d of the size", decade);
-        lab_table_begin(t, title,
-                        "scene\tcheapest method\tthe next other method costs, times\t" BASE_METHOD
-                        " costs, times");
-        for (const scene *s = all->scenes; s < all->scenes + all->count; s++)
-            put_cheapest(t, s, pow(10, decade));
-        lab_table_end(t);
-    }
-}
-
 /* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
  * the finest. Points within the reference's error, and cases whose steps were not all of dt, are none. */
 static size_t asymptotic_range(const lab_series *s, double dt[MAX_POINTS], double error[MAX_POINTS])
@@ -421,7 +406,16 @@ static drape_status report(lab *l)
     if (!out)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for tables.md");
     tabulate_scenes(&all);
-    tabulate_cheapest(&all);
+    for (int decade = -2; decade >= -4; decade--) {
+        char title[96];
+        snprintf(title, sizeof title, "At an error of 1e%d of the size", decade);
+        lab_table_begin(&all.table, title,
+                        "scene\tcheapest method\tthe next other method costs, times\t" BASE_METHOD
+                        " costs, times");
+        for (size_t i = 0; i < count; i++)
+            put_cheapest(&all.table, &scenes[i], pow(10, decade));
+        lab_table_end(&all.table);
+    }
     tabulate_orders(&all);
     tabulate_failures(&all);
     fclose(out);

@@ -391,20 +391,6 @@ typedef struct attempt {
     char ended_by[160];
 } attempt;
 
-static json_t *settings_of(const lab_ivp *s, const family *f, double knob)
-{
-    const drape_entry *entry = &lab_find_integrator(f->method)->entry;
-    char pointer[64];
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", f->method,
-                                 f->rtol > 0 ? "/integrator/rtol" : "/integrator/dt", knob);
-    snprintf(pointer, sizeof pointer, "/integrator/%s", f->also ? f->also : "");
-    if (f->also && lab_has_param(entry, f->also))
-        json_object_set_new(settings, pointer, json_integer(f->also_value));
-    if (lab_has_param(entry, "tolerance"))
-        json_object_set_new(settings, "/integrator/tolerance", json_real(least_tolerance(s)));
-    return settings;
-}
-
 /* Row i of the table of Neville and Aitken from row i - 1, which it replaces: column k + 1 removes the error
  * of the exponent order + k stride. Sets which column changed the least, and by how much. */
 static drape_status extrapolate(const lab_ivp *s, attempt *a, lab_trace next)
@@ -478,7 +464,16 @@ static drape_status refine(const lab_ivp *s, double seconds, const attempt *atte
             snprintf(a->ended_by, sizeof a->ended_by, "the next level would take too long");
             break;
         }
-        status = run_scene(s, settings_of(s, f, knob), seconds - a->spent, &trace, &result);
+        const drape_entry *entry = &lab_find_integrator(f->method)->entry;
+        char pointer[64];
+        json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", f->method,
+                                     f->rtol > 0 ? "/integrator/rtol" : "/integrator/dt", knob);
+        snprintf(pointer, sizeof pointer, "/integrator/%s", f->also ? f->also : "");
+        if (f->also && lab_has_param(entry, f->also))
+            json_object_set_new(settings, pointer, json_integer(f->also_value));
+        if (lab_has_param(entry, "tolerance"))
+            json_object_set_new(settings, "/integrator/tolerance", json_real(least_tolerance(s)));
+        status = run_scene(s, settings, seconds - a->spent, &trace, &result);
         took = drape_clock_thread_seconds() - start - a->spent;
         a->spent += took;
         if (!status && trace.frames) {
@@ -656,23 +651,6 @@ static drape_status measure(const lab_ivp *s, const drape_model *model, const do
     return status;
 }
 
-/* The method that measures, with steps that are the same in all runs. */
-static drape_status choose_method(const lab_ivp *s, json_t **settings)
-{
-    const drape_integrator_ops *verlet = lab_find_integrator("verlet");
-    double dt = s->interval / STEPS;
-    drape_status status = lab_ivp_admits(s, verlet) ? find_dt(s, verlet, STEPS, &dt) : DRAPE_OK;
-    const bool is_explicit =
-        lab_ivp_admits(s, verlet) && BEYOND * drape_model_duration(s->model) < MOST_STEPS * dt;
-    *settings = json_pack("{s:s, s:f}", "/integrator/method", is_explicit ? "verlet" : "trbdf2",
-                          "/integrator/dt", is_explicit ? dt : s->interval / STEPS);
-    if (is_explicit)
-        json_object_set_new(*settings, "/integrator/substeps", json_integer(1));
-    else
-        json_object_set_new(*settings, "/integrator/tolerance", json_real(least_tolerance(s)));
-    return status;
-}
-
 drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
 {
     double t[SAMPLES], growth[SAMPLES] = {0}, largest = 0, horizon = INFINITY;
@@ -680,7 +658,17 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     size_t count = 0;
     drape_model *model = NULL;
     json_t *settings;
-    drape_status status = choose_method(s, &settings);
+    const drape_integrator_ops *verlet = lab_find_integrator("verlet");
+    double dt = s->interval / STEPS;
+    drape_status status = lab_ivp_admits(s, verlet) ? find_dt(s, verlet, STEPS, &dt) : DRAPE_OK;
+    const bool is_explicit =
+        lab_ivp_admits(s, verlet) && BEYOND * drape_model_duration(s->model) < MOST_STEPS * dt;
+    settings = json_pack("{s:s, s:f}", "/integrator/method", is_explicit ? "verlet" : "trbdf2",
+                         "/integrator/dt", is_explicit ? dt : s->interval / STEPS);
+    if (is_explicit)
+        json_object_set_new(settings, "/integrator/substeps", json_integer(1));
+    else
+        json_object_set_new(settings, "/integrator/tolerance", json_real(least_tolerance(s)));
     for (int i = 0; i < SAMPLES; i++)
         t[i] = BEYOND * duration * (i + 1) / SAMPLES;
     if (!status)
@@ -722,17 +710,6 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
 
 /* ---- Score ---- */
 
-/* The error of a frame, relative to the size, and the largest of a node. */
-static double frame_error(const lab_ivp *s, const double *x, size_t i, double *largest)
-{
-    const double *a = x + s->reference.size * i, *b = s->reference.x + s->reference.size * i;
-    double far = 0;
-    for (size_t k = 0; k < s->reference.size; k += 3)
-        far = fmax(far, hypot(hypot(a[k] - b[k], a[k + 1] - b[k + 1]), a[k + 2] - b[k + 2]));
-    *largest = far / s->size;
-    return lab_distance(s->model, a, b) / s->size;
-}
-
 /* As JSON: {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...], "error_end",
  * "error_max", "mescd", "reference_error", "resolved"} */
 drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out)
@@ -749,7 +726,13 @@ drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *
     if (!json)
         fprintf(out, "time_s,error,error_largest\n");
     for (size_t i = 0; i < s->time_count; i++) {
-        error = frame_error(s, x, i, &far);
+        /* The error of the frame, relative to the size, and the largest of a node. */
+        const double *a = x + s->reference.size * i, *b = s->reference.x + s->reference.size * i;
+        far = 0;
+        for (size_t k = 0; k < s->reference.size; k += 3)
+            far = fmax(far, hypot(hypot(a[k] - b[k], a[k + 1] - b[k + 1]), a[k + 2] - b[k + 2]));
+        far /= s->size;
+        error = lab_distance(s->model, a, b) / s->size;
         worst = fmax(worst, error);
         errors = drape_json_append(errors, json_real(error));
         largest = drape_json_append(largest, json_real(far));

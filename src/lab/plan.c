@@ -91,38 +91,30 @@ typedef struct total {
     double value, low, high; /* bounds of the 95 % confidence interval; NaN: the sample is too small */
 } total;
 
-/* The total of a stratum and its variance, added. */
-static void add_total(const stratum *s, double *sum, double *variance, double *freedom)
+/* strata (count + 1): the last one becomes that of those with a small sample. */
+static total total_cpu(stratum *strata, size_t count)
 {
-    if (s->count < 1)
-        return;
-    const double mean = s->sum / s->count;
-    const double spread = fmax(0, s->squares - s->count * mean * mean) / fmax(1, s->count - 1);
-    *sum += s->cases * mean;
-    *variance += s->cases * s->cases * (1 - s->count / s->cases) * spread / s->count;
-    *freedom += s->count - 1;
-}
-
-static total total_cpu(const stratum *strata, size_t count)
-{
-    stratum rest = {.cases = 0};
-    double sum = 0, variance = 0, freedom = 0, spent = 0;
+    stratum *rest = &strata[count], all = {.cases = 0};
+    double sum = 0, variance = 0, freedom = 0;
+    *rest = all;
     for (size_t i = 0; i < count; i++) {
-        spent += strata[i].sum;
+        add_stratum(&all, &strata[i]);
         if (strata[i].count < 2)
-            add_stratum(&rest, &strata[i]);
-        else
-            add_total(&strata[i], &sum, &variance, &freedom);
+            add_stratum(rest, &strata[i]);
     }
-    add_total(&rest, &sum, &variance, &freedom);
-    if (rest.count < 1 && rest.cases > 0) { /* none of these is in the sample: as the mean of all others */
-        stratum all = {.cases = 0};
-        for (size_t i = 0; i < count; i++)
-            add_stratum(&all, &strata[i]);
-        sum += rest.cases * all.sum / fmax(1, all.count);
+    for (const stratum *s = strata; s <= rest; s++) { /* the total of each and its variance */
+        if (s->count < 1 || (s < rest && s->count < 2))
+            continue;
+        const double mean = s->sum / s->count;
+        const double spread = fmax(0, s->squares - s->count * mean * mean) / fmax(1, s->count - 1);
+        sum += s->cases * mean;
+        variance += s->cases * s->cases * (1 - s->count / s->cases) * spread / s->count;
+        freedom += s->count - 1;
     }
+    if (rest->count < 1 && rest->cases > 0) /* none of these is in the sample: as the mean of all others */
+        sum += rest->cases * all.sum / fmax(1, all.count);
     const double half = freedom >= 1 ? lab_student(freedom) * sqrt(variance) : NAN;
-    return (total){sum, fmax(spent, sum - half), sum + half};
+    return (total){sum, fmax(all.sum, sum - half), sum + half};
 }
 
 static double file_bytes(const lab *l, const char *name)
@@ -145,7 +137,7 @@ typedef struct plan {
 
 static plan make_plan(const lab *l, const size_t *sample, size_t sampled)
 {
-    stratum strata[MAX_STRATA];
+    stratum strata[MAX_STRATA + 1];
     size_t count = 0;
     double lines = 0, rows = 0;
     plan p = {.sampled = 0, .jobs = l->def->jobs};

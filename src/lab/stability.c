@@ -496,23 +496,6 @@ static void draw_limit(map *m)
         lab_figure_curve(&m->f, (lab_style){LAB_BLACK, 2, 0}, m->limits++ ? NULL : "explicit limit 2/omega");
 }
 
-/* The stability limit of the step, where one of the two axes is the step, along the other. */
-static void add_limit(map *m)
-{
-    const int step = step_axis(m->s);
-    if (step < 0 || step > 1)
-        return;
-    const axis *other = &m->s->axes[1 - step];
-    lab_figure_data(&m->f);
-    for (int k = 0; k < other->count; k++) {
-        const size_t i = m->first + (size_t)k * (step == 0 ? (size_t)m->s->axes[0].count : 1);
-        const double limit = lab_number(m->l->results[i], "explicit_limit_s"), along = axis_value(other, k);
-        if (!isnan(limit))
-            lab_figure_point(&m->f, step == 0 ? limit : along, step == 0 ? along : limit);
-    }
-    draw_limit(m);
-}
-
 /* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
 static void add_limit_at(map *m, size_t i, double bottom, double top)
 {
@@ -573,7 +556,17 @@ static drape_status draw_map(lab *l, map *m, int third)
     set_axis(&s->axes[0], &m->f.axes[0]);
     set_axis(&s->axes[1], &m->f.axes[1]);
     write_cells(m);
-    add_limit(m);
+    /* The stability limit of the step, where one of the two axes is the step, along the other. */
+    const int step = step_axis(s);
+    const axis *other = step == 0 || step == 1 ? &s->axes[1 - step] : NULL;
+    lab_figure_data(&m->f);
+    for (int k = 0; other && k < other->count; k++) {
+        const size_t i = m->first + (size_t)k * (step == 0 ? (size_t)s->axes[0].count : 1);
+        const double limit = lab_number(l->results[i], "explicit_limit_s"), along = axis_value(other, k);
+        if (!isnan(limit))
+            lab_figure_point(&m->f, step == 0 ? limit : along, step == 0 ? along : limit);
+    }
+    draw_limit(m);
     return end_map(l, m, caption);
 }
 

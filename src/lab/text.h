@@ -1,4 +1,4 @@
-/* text.h: the files and the page of a report. */
+/* text.h: the files and the page of a report, and units for its figures. */
 #ifndef DRAPE_LAB_TEXT_H
 #define DRAPE_LAB_TEXT_H
 
@@ -22,7 +22,7 @@ drape_status lab_read_json(drape_arena *arena, const char *folder, const char *n
 drape_status lab_write_csv(lab *l);
 
 /* The unit of a scene's value at a JSON pointer, as "Pa"; "" if it has none, or if it depends on other values
- * of the scene (units.c). */
+ * of the scene. */
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);

@@ -179,18 +179,6 @@ static void put_line(drape_file *file, const lab_record *record)
     json_decref(line);
 }
 
-static bool belongs_to(const json_t *line, const lab_record *record)
-{
-    char digits[17];
-    const drape_reference *r = record->reference;
-    if (strcmp(lab_text(line, "name"), r->entry.name) != 0 ||
-        lab_number(line, "value") != r->parameters[record->index] ||
-        strcmp(lab_text(line, "drape"), drape_version()) != 0)
-        return false;
-    hash_of(record, digits);
-    return strcmp(lab_text(line, "scene_hash"), digits) == 0;
-}
-
 static bool is_cases(const void *user, const char *name)
 {
     (void)user;
@@ -201,7 +189,7 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
                               drape_folder **folder, drape_file *file)
 {
     drape_arena arena = drape_arena_of(ctx);
-    char *text;
+    char *text, digits[17];
     size_t size;
     drape_status status = drape_folder_open(ctx, path, false, folder);
     if (!status)
@@ -213,7 +201,12 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
             for (size_t i = 0; line && i < count; i++) {
                 lab_record *record = &records[i];
                 drape_validation *v = &record->v;
-                if (record->done || !belongs_to(line, record))
+                if (record->done || strcmp(lab_text(line, "name"), record->reference->entry.name) != 0 ||
+                    lab_number(line, "value") != record->reference->parameters[record->index] ||
+                    strcmp(lab_text(line, "drape"), drape_version()) != 0)
+                    continue;
+                hash_of(record, digits);
+                if (strcmp(lab_text(line, "scene_hash"), digits) != 0)
                     continue;
                 *v = (drape_validation){.parameter = record->reference->parameters[record->index],
                                         .obtained = lab_number(line, "obtained"),

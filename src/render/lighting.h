@@ -8,8 +8,8 @@
 #ifndef DRAPE_RENDER_LIGHTING_H
 #define DRAPE_RENDER_LIGHTING_H
 
+#include "render/camera.h"
 #include "render/gl.h"
-#include "render/matrix.h"
 
 typedef struct drape_lighting {
     int width, height;                 /* of its buffers [pixels] */

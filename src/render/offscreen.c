@@ -69,13 +69,11 @@ static drape_status open_all(drape_offscreen *o)
 
 drape_status drape_offscreen_create(drape_context *ctx, drape_offscreen **out)
 {
-    *out = drape_alloc(ctx, 1, sizeof **out);
-    if (!*out)
+    drape_offscreen *o = *out = drape_alloc(ctx, 1, sizeof *o);
+    if (!o)
         return DRAPE_E_MEMORY;
-    (*out)->ctx = ctx;
-    (*out)->display = EGL_NO_DISPLAY;
-    (*out)->context = EGL_NO_CONTEXT;
-    drape_status status = open_all(*out);
+    *o = (drape_offscreen){.ctx = ctx, .display = EGL_NO_DISPLAY, .context = EGL_NO_CONTEXT};
+    drape_status status = open_all(o);
     if (status)
         drape_offscreen_destroy(out);
     return status;

@@ -4,7 +4,7 @@
 
 #include "base/vec3.h"
 #include "colliders/colliders.h"
-#include "render/matrix.h"
+#include "render/camera.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -82,26 +82,31 @@ static void on_scroll(GLFWwindow *handle, double x, double y)
     put(handle, (drape_input){.kind = DRAPE_INPUT_SCROLL, .y = y});
 }
 
-static drape_status fail(drape_context *ctx, const char *what)
+drape_status drape_window_create(drape_context *ctx, const char *title, int width, int height,
+                                 drape_window **out)
 {
-    const char *why = NULL;
-    glfwGetError(&why);
-    return drape_fail(ctx, DRAPE_E_FILE, "%s: %s; drape render draws without a display", what,
-                      why ? why : "GLFW does not say why");
-}
-
-static drape_status open_window(drape_window *w, const char *title, int width, int height)
-{
+    drape_window *w = *out = drape_alloc(ctx, 1, sizeof *w);
+    if (!w)
+        return DRAPE_E_MEMORY;
+    w->ctx = ctx;
     w->ready = glfwInit();
-    if (!w->ready)
-        return fail(w->ctx, "there is no display for a window");
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
-    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
-    w->handle = glfwCreateWindow(width, height, title, NULL, NULL);
-    if (!w->handle)
-        return fail(w->ctx, "no window with OpenGL 3.3");
+    if (w->ready) {
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+        glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+        glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
+        w->handle = glfwCreateWindow(width, height, title, NULL, NULL);
+    }
+    if (!w->handle) {
+        const char *why = NULL;
+        glfwGetError(&why);
+        drape_status status =
+            drape_fail(ctx, DRAPE_E_FILE, "%s: %s; drape render draws without a display",
+                       w->ready ? "no window with OpenGL 3.3" : "there is no display for a window",
+                       why ? why : "GLFW does not say why");
+        drape_window_destroy(out);
+        return status;
+    }
     glfwMakeContextCurrent(w->handle);
     glfwSwapInterval(1);
     glfwSetWindowUserPointer(w->handle, w);
@@ -111,19 +116,6 @@ static drape_status open_window(drape_window *w, const char *title, int width, i
     glfwSetCursorPosCallback(w->handle, on_move);
     glfwSetScrollCallback(w->handle, on_scroll);
     return DRAPE_OK;
-}
-
-drape_status drape_window_create(drape_context *ctx, const char *title, int width, int height,
-                                 drape_window **out)
-{
-    *out = drape_alloc(ctx, 1, sizeof **out);
-    if (!*out)
-        return DRAPE_E_MEMORY;
-    (*out)->ctx = ctx;
-    drape_status status = open_window(*out, title, width, height);
-    if (status)
-        drape_window_destroy(out);
-    return status;
 }
 
 void drape_window_destroy(drape_window **window)
