@@ -34,8 +34,8 @@ static drape_status add_time(lab *l, const drape_integrator_ops *integrator, con
     const double ratio = own ? 0.1 : 0.5;
     lab_level levels[MAX_LEVELS];
     double value = own ? FIRST_RTOL : FIRST_DT;
-    /* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt
-     * is, and one may choose its order by rtol, unless the scene fixes their number or the order. */
+    /* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever
+     * dt is, and one may choose its order by rtol, unless the scene fixes their number or the order. */
     const char *fixes = own ? integrator->order_parameter : "substeps";
     bool fixed = own ? !fixes : !integrator->stability || !lab_has_param(&integrator->entry, fixes);
     for (size_t i = 0; !fixed && i < given->setting_count; i++)
@@ -256,8 +256,8 @@ static void report_order(const sequence *s, FILE *out)
 
 /* ---- The figures and the tables ---- */
 
-/* The sequences over one knob. The refinements that a line is fitted through are filled markers, or all, if there is
- * none; others are open. */
+/* The sequences over one knob. The refinements that a line is fitted through are filled markers, or all, if
+ * there is none; others are open. */
 static drape_status draw(lab *l, const sequence *sequences, size_t count, const char *knob, const char *label)
 {
     lab_figure f;

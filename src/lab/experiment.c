@@ -1,7 +1,7 @@
 /*
- * experiment.c: an experiment from its def to its report, and the merging of shards. Its cases are run by several
- * threads into a file of lines. A case that has a line is not run again; a line that a kill cut short is dropped, and
- * its case is run again.
+ * experiment.c: an experiment from its def to its report, and the merging of shards. Its cases are run by
+ * several threads into a file of lines. A case that has a line is not run again; a line that a kill cut short
+ * is dropped, and its case is run again.
  */
 #include "drape/lab.h"
 
@@ -125,8 +125,8 @@ static drape_status take_line(lab *l, const char *path, int64_t number, const ch
     return DRAPE_OK;
 }
 
-/* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay. *found counts
- * the new ones. */
+/* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay.
+ * *found counts the new ones. */
 static drape_status read_lines(lab *l, const char *folder, int64_t *found)
 {
     DIR *entries = opendir(folder);
@@ -160,8 +160,8 @@ void lab_put_line(drape_file *file, const json_t *object)
     drape_file_put_text(file, "\n");
 }
 
-/* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller destroys it in
- * any case. */
+/* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller
+ * destroys it in any case. */
 static drape_status begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
 {
     drape_status status = drape_export_begin(l->ctx, l->out, name, file);

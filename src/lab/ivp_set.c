@@ -1,5 +1,5 @@
-/* ivp_set.c: the scenes of the test set: their references and horizons, their files, also for other programs: what
- * these need, and how far their motion is from the reference; see ivp.h. */
+/* ivp_set.c: the scenes of the test set: their references and horizons, their files, also for other programs:
+ * what these need, and how far their motion is from the reference; see ivp.h. */
 #include "base/hash.h"
 
 #include "base/clock.h"
@@ -118,8 +118,8 @@ static drape_status load_with(const lab_ivp *s, const json_t *settings, drape_mo
     return lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, model);
 }
 
-/* A step of which so many or, of an explicit method, as many times 2^k as keep it below a quarter of its stability
- * limit at the start, make up an interval. */
+/* A step of which so many or, of an explicit method, as many times 2^k as keep it below a quarter of its
+ * stability limit at the start, make up an interval. */
 static drape_status find_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt)
 {
     drape_sim *sim = NULL;
@@ -143,8 +143,8 @@ static drape_status find_dt(const lab_ivp *s, const drape_integrator_ops *integr
     return status;
 }
 
-/* Runs the scene with settings {pointer: value}, which this takes, and records it at the times. A run that takes more
- * CPU seconds than that, or fails, leaves no frames: *result says why and is to be freed. */
+/* Runs the scene with settings {pointer: value}, which this takes, and records it at the times. A run that
+ * takes more CPU seconds than that, or fails, leaves no frames: *result says why and is to be freed. */
 static drape_status run_scene(const lab_ivp *s, json_t *settings, double seconds, lab_trace *out,
                               json_t **result)
 {
@@ -351,10 +351,10 @@ json_t *lab_ivp_read_horizon(const lab_ivp *s)
 
 /* ---- The reference of a scene ----
  *
- * Each family of methods is refined until it changes no more, or its time is used up; of those of fixed steps the
- * results of successive dt are extrapolated to dt = 0 (Richardson 1911; Hairer, Norsett & Wanner 1993, II.9). The
- * reference is that of the family with the smallest change at its last refinement, and its error the distance to the
- * nearest result of another family. */
+ * Each family of methods is refined until it changes no more, or its time is used up; of those of fixed steps
+ * the results of successive dt are extrapolated to dt = 0 (Richardson 1911; Hairer, Norsett & Wanner 1993,
+ * II.9). The reference is that of the family with the smallest change at its last refinement, and its error
+ * the distance to the nearest result of another family. */
 
 #define MAX_LEVELS   10
 #define ENOUGH       1e-2 /* of the goal: no further refinement */
@@ -580,9 +580,9 @@ drape_status lab_ivp_reference(lab_ivp *s, double seconds, bool check, FILE *out
 
 /* ---- How fast a small perturbation of the start grows ----
  *
- * The method is explicit where it solves the equations of the scene at bearable cost, because its steps are a smooth
- * function of the state: there is no iteration whose remainder would be taken for growth. Else it is trbdf2, solved
- * to rounding. */
+ * The method is explicit where it solves the equations of the scene at bearable cost, because its steps are a
+ * smooth function of the state: there is no iteration whose remainder would be taken for growth. Else it is
+ * trbdf2, solved to rounding. */
 
 #define PERTURBATION 1e-10 /* of the size */
 #define LIMIT        1e4   /* growth that ends the horizon */
@@ -710,8 +710,8 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
 
 /* ---- Score ---- */
 
-/* As JSON: {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...], "error_end",
- * "error_max", "mescd", "reference_error", "resolved"} */
+/* As JSON: {"scene", "scene_hash", "size_m", "times_s": [...], "error": [...], "error_largest": [...],
+ * "error_end", "error_max", "mescd", "reference_error", "resolved"} */
 drape_status lab_ivp_score(const lab_ivp *s, const char *path, bool json, FILE *out)
 {
     double *x = NULL, worst = 0, error = 0, far;

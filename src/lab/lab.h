@@ -109,7 +109,8 @@ struct lab {
 /* Adds a case of rank 0. Takes the references of tags and settings. same_as < 0: none. */
 drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as);
 
-/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared with. */
+/* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
+ * with. */
 lab_request lab_request_of(const lab *l, size_t index);
 
 /* Adds an object as a line. */
@@ -165,7 +166,8 @@ drape_status lab_try(drape_context *ctx, const lab_request *request);
  * (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
 
-/* ---- plan.c: what a sweep will take, from a sample of its cases: CPU time, time on free cores, memory, disk ---- */
+/* ---- plan.c: what a sweep will take, from a sample of its cases: CPU time, time on free cores, memory, disk
+ * ---- */
 
 /* The cases of this shard that are run for a plan of def->plan cases, spread evenly over all of them, in the
  * order in which they are to be run: at most def->plan, and the same ones in every call. cases: room for
@@ -178,7 +180,8 @@ drape_status lab_write_plan(lab *l);
 /* Whether a case is run by this shard: it is its own, and not the same as another one. */
 bool lab_is_ours(const lab *l, size_t i);
 
-/* ---- schema.c: experiment.json and cases.jsonl of a stranger, checked once, before anything of them is used ---- */
+/* ---- schema.c: experiment.json and cases.jsonl of a stranger, checked once, before anything of them is used
+ * ---- */
 
 /* Checks the content of experiment.json; file: its path, for the message. From then on its members have
  * the types of lab.h, tags and names no control characters, same_as is an earlier case that has a result

@@ -197,14 +197,14 @@ static drape_status search(problem *p, int32_t wanted)
     return status;
 }
 
-/* Counts all eigenvalues up to a gap behind the wanted ones, and those missing among the pairs; *missing -1: it
- * is not known here. */
+/* Counts all eigenvalues up to a gap behind the wanted ones, and those missing among the pairs; *missing -1:
+ * it is not known here. */
 static drape_status find_missing(const problem *p, int32_t wanted, int64_t *missing, int64_t *below)
 {
     int64_t negative;
     bool known;
-    /* The widest gap behind the wanted pairs, relative to the distance from the shift, and how many are before
-     * it; 0: there is none. */
+    /* The widest gap behind the wanted pairs, relative to the distance from the shift, and how many are
+     * before it; 0: there is none. */
     double gap = 0;
     int32_t behind = 0;
     for (int32_t k = wanted; k < p->count; k++) {

@@ -183,8 +183,8 @@ DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the star
 
 /* ---- Pendulums ----
  *
- * The period of two nodes on a stiff sheet that hangs from an axis and is released at an angle. Steps are 1/400 of the
- * period of small swings; the sheet stretches by less than 1e-4. */
+ * The period of two nodes on a stiff sheet that hangs from an axis and is released at an angle. Steps are
+ * 1/400 of the period of small swings; the sheet stretches by less than 1e-4. */
 
 #define STEPS 400
 #define STEP  0.0050151667017766174 /* [s] 2 pi/sqrt(g)/STEPS */

@@ -40,8 +40,8 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
     const bool own = integrator->own_steps;
     const lab_levels levels = own ? g->rtols : g->steps;
     drape_status status = DRAPE_OK;
-    /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it; otherwise 0,
-     * for none, alone. */
+    /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it;
+     * otherwise 0, for none, alone. */
     bool chosen = !lab_has_param(&integrator->entry, "max_order");
     for (size_t i = 0; i < l->def->setting_count; i++)
         chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;

@@ -203,8 +203,8 @@ drape_status lab_omega(drape_reference_run *run, double *value)
         status = drape_sim_modes(run->sim, &def, &modes);
     *value = NAN;
     for (const drape_mode *mode = modes.modes; mode < modes.modes + modes.count && number > 0; mode++) {
-        /* Its share in the motion of the whole scene along axis k: (sum m u_k)^2/(sum m u^2 sum m). A mode that
-         * twists a strip, or bends it in its plane, has none. */
+        /* Its share in the motion of the whole scene along axis k: (sum m u_k)^2/(sum m u^2 sum m). A mode
+         * that twists a strip, or bends it in its plane, has none. */
         const double *mass = drape_model_masses(run->model);
         double sum = 0, all = 0;
         for (size_t i = 0; constants[0] && i < (size_t)drape_model_node_count(run->model); i++) {

@@ -55,8 +55,8 @@ const char *lab_sheet_format(char text[400], const char *format, ...) __attribut
 /* Advances to the end of the scene. */
 drape_status lab_advance(drape_reference_run *run);
 
-/* The mean position of the nodes that had the largest x at rest; its y; its -y; its angle [degree] below the x
- * axis. */
+/* The mean position of the nodes that had the largest x at rest; its y; its -y; its angle [degree] below the
+ * x axis. */
 void lab_tip(const drape_reference_run *run, double tip[3]);
 double lab_rise(const drape_reference_run *run);
 double lab_sinking(const drape_reference_run *run);

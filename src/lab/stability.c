@@ -163,8 +163,8 @@ static drape_status read_space(lab *l, space *s)
     return status;
 }
 
-/* What the axes of a def must be besides: an axis of an integer value with fractions would be rounded, and the map
- * would show wrong values. */
+/* What the axes of a def must be besides: an axis of an integer value with fractions would be rounded, and
+ * the map would show wrong values. */
 static drape_status check_space(lab *l, const space *s)
 {
     for (int i = 0; i < s->count; i++) {
@@ -264,8 +264,8 @@ static drape_status plan(lab *l)
             continue;
         for (size_t cell = 0; cell < s.cells && !status; cell++)
             status = add_cell(l, &s, integrator, cell, first);
-        /* Before hours are spent, checks that the scene compiles at both ends of every axis and one step inside, as
-         * an axis with integer ends may have fractions between. */
+        /* Before hours are spent, checks that the scene compiles at both ends of every axis and one step
+         * inside, as an axis with integer ends may have fractions between. */
         const size_t cells[] = {0, inside, s.cells - 1};
         for (size_t k = 0; k < sizeof cells / sizeof *cells && !status; k++) {
             const lab_request request = lab_request_of(l, first + cells[k]);
@@ -417,7 +417,8 @@ static look look_at(const map *m, lab_fill kind, size_t i)
     const verdict v = judge(m->l, m->l->results[i]);
     const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
     const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
-    /* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low end. */
+    /* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low
+     * end. */
     const double at = value == 0 && m->shade.axis.log ? 0 : lab_axis_share(&m->shade.axis, value);
     const double share =
         shaded ? (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * at))) + 0.5) / LAB_SHADES : 1;

@@ -77,8 +77,8 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_po
         drape_system_symmetrize(t->system, &point, 0, t->values);
     if (!needs_potential || !t->follows)
         return DRAPE_OK;
-    /* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be symmetric after
-     * all, as under the pressure on cloth that is pinned all round. */
+    /* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be
+     * symmetric after all, as under the pressure on cloth that is pinned all round. */
     drape_system_jacobian_without(t->system, &point, 0, 0, t->potential, t->scratch);
     const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
     return asymmetry > MAX_ASYMMETRY

@@ -30,8 +30,8 @@ void lab_page_heading(lab *l, const char *text);
 /* Adds a figure with its caption. */
 void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
-/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell, unless
- * it has a tab, nor HTML. */
+/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell,
+ * unless it has a tab, nor HTML. */
 typedef struct lab_table {
     lab *l;
     FILE *markdown;

@@ -58,9 +58,9 @@ static drape_status plan(lab *l)
 
 /* ---- The reference solution ----
  *
- * The motion of the most accurate run that the time allows, with its distance from the next less accurate one as the
- * estimate of its error. There are two sequences of refinements: ida over rtol at order 5, and trbdf2 over dt; the one
- * with the smaller distance between its last two levels is taken. */
+ * The motion of the most accurate run that the time allows, with its distance from the next less accurate one
+ * as the estimate of its error. There are two sequences of refinements: ida over rtol at order 5, and trbdf2
+ * over dt; the one with the smaller distance between its last two levels is taken. */
 
 #define MAX_LEVELS  6
 #define BUDGET      20.0 /* case_seconds that each sequence may take */
@@ -301,8 +301,8 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
     return status ? status : removed;
 }
 
-/* Makes l->reference, or reads it if the folder has it (reference.json, reference.f64). DRAPE_E_SOLVER if neither
- * sequence has two levels that complete. */
+/* Makes l->reference, or reads it if the folder has it (reference.json, reference.f64). DRAPE_E_SOLVER if
+ * neither sequence has two levels that complete. */
 static drape_status make_reference(lab *l)
 {
     drape_model *model = NULL;

@@ -61,7 +61,8 @@ struct drape_reference {
     /* Writes the text of the scene of a case, in which ' stands for "; returns its length. */
     int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
     double constants[4]; /* for `scene` or `measure`, where references differ in them */
-    /* What is measured: the state at the end of the scene, or, by `measure`, which advances the sim itself. */
+    /* What is measured: the state at the end of the scene, or, by `measure`, which advances the sim
+     * itself. */
     double (*value)(const drape_reference_run *run);
     drape_status (*measure)(drape_reference_run *run, double *value);
     /* For thresholds: the quantity is the load above which that is > 0, sought between these multiples of

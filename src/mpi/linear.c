@@ -1,6 +1,6 @@
 /*
- * linear.c: the direct solver of a matrix that ranks share, MUMPS by PETSc; see ranks.h. The rows of a rank's own
- * nodes are complete in its values, and go into a matrix of PETSc of block size 3.
+ * linear.c: the direct solver of a matrix that ranks share, MUMPS by PETSc; see ranks.h. The rows of a rank's
+ * own nodes are complete in its values, and go into a matrix of PETSc of block size 3.
  *
  * MUMPS has LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
  */
@@ -54,8 +54,8 @@ static drape_status create(drape_arena *arena, const drape_pattern *p, void **st
     s->ranks = drape_mpi_ranks_of(p->ranks);
     s->workspace = LEAST_WORKSPACE;
     PetscInt *outside = inside + n;
-    /* The nonzeros of each row in columns here, and in those of other ranks: the pattern is symmetric, columns are
-     * rows. */
+    /* The nonzeros of each row in columns here, and in those of other ranks: the pattern is symmetric,
+     * columns are rows. */
     for (PetscInt i = 0; i < own; i++) {
         PetscInt blocks = 0;
         for (int32_t k = p->block_start[i]; k < p->block_start[i + 1]; k++)
@@ -128,8 +128,8 @@ static bool begin_direct(mpi_linear *s)
             MatMumpsSetIcntl(factors, 24, 1)); /* counts pivots that are zero, instead of failing */
 }
 
-/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. *lacks: the workspace or a
- * buffer was too small, by the errors of MUMPS. */
+/* Whether there are factors and, if a definite matrix is asked for, no negative pivot. *lacks: the workspace
+ * or a buffer was too small, by the errors of MUMPS. */
 static bool factor_once(mpi_linear *s, bool *lacks)
 {
     PCType type = NULL;

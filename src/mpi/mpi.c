@@ -1,7 +1,8 @@
 /*
- * mpi.c: see mpi.h. The part of a compiled model that one rank has: the nodes that it owns, every element, edge and
- * triangle that touches one of these, and copies of the other nodes of these. Forces and rows of matrices of its own
- * nodes are complete without any other rank, and are sums of the same numbers in the same order as in one process.
+ * mpi.c: see mpi.h. The part of a compiled model that one rank has: the nodes that it owns, every element,
+ * edge and triangle that touches one of these, and copies of the other nodes of these. Forces and rows of
+ * matrices of its own nodes are complete without any other rank, and are sums of the same numbers in the same
+ * order as in one process.
  */
 #include "mpi/mpi.h"
 
@@ -107,9 +108,9 @@ bool drape_mpi_is_same(const drape_mpi *mpi, uint64_t value)
 
 /* ---- Which rank owns which node ----
  *
- * By recursive coordinate bisection of where the nodes start: a plane across the longest side of their box parts
- * them in proportion to the ranks of either side. Runs on the same number of ranks have the same parts; those of
- * PT-Scotch differed from run to run. */
+ * By recursive coordinate bisection of where the nodes start: a plane across the longest side of their box
+ * parts them in proportion to the ranks of either side. Runs on the same number of ranks have the same parts;
+ * those of PT-Scotch differed from run to run. */
 
 typedef struct place {
     double x; /* along the longest side of the box */
@@ -502,8 +503,8 @@ static drape_status make(maker *k, drape_mpi_ranks *ranks)
         status = drape_compile_pattern(m);
     if (status)
         return status;
-    /* The block columns of the matrix of all ranks are the free nodes of rank 0, then those of rank 1 and so on, each
-     * in ascending order. */
+    /* The block columns of the matrix of all ranks are the free nodes of rank 0, then those of rank 1 and so
+     * on, each in ascending order. */
     int64_t *next = drape_arena_take(&k->scratch, (size_t)ranks->base.count + 1, sizeof *next);
     int64_t *block = drape_arena_take(&k->m->arena, (size_t)m->block_count, sizeof *block);
     if (!next || !block)

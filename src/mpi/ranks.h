@@ -55,8 +55,8 @@ int drape_mpi_close(const drape_ranks *ranks, bool durable);
 
 /* ---- linear.c: the direct solver of a matrix that ranks share (pattern->ranks) ---- */
 
-/* It is not in the table of linear solvers, as no scene names it: a run on several ranks has it in place of direct
- * ones (drape_linear_of). */
+/* It is not in the table of linear solvers, as no scene names it: a run on several ranks has it in place of
+ * direct ones (drape_linear_of). */
 extern const drape_linear_ops drape_linear_mpi_direct;
 
 /* drape_ranks.inertia: the signs of the pivots of MUMPS. *known: also false if the matrix is not

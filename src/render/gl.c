@@ -201,8 +201,8 @@ drape_status drape_gl_check(drape_context *ctx, const char *action)
 
 /* ---- The canvas ----
  *
- * Shaders convert to sRGB once per pixel. A framebuffer that did it would convert each sample, and back, which takes
- * a software renderer as long as everything else. */
+ * Shaders convert to sRGB once per pixel. A framebuffer that did it would convert each sample, and back,
+ * which takes a software renderer as long as everything else. */
 
 #define SAMPLES 4
 

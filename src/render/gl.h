@@ -1,4 +1,5 @@
-/* gl.h: OpenGL 3.3 core, through libepoxy: programs of shaders, buffers of vertices, the canvas of a picture. */
+/* gl.h: OpenGL 3.3 core, through libepoxy: programs of shaders, buffers of vertices, the canvas of a
+ * picture. */
 #ifndef DRAPE_RENDER_GL_H
 #define DRAPE_RENDER_GL_H
 

@@ -120,7 +120,8 @@ void drape_overlay_legend(drape_overlay *o, float right, float bottom, float tal
                           double low, double high)
 {
     float u = o->unit, wide = roundf(16 * u), gap = 7 * u;
-    /* 1, 2 or 5 times a power of ten, such that at most TICKS steps fill the range, or as many as have room. */
+    /* 1, 2 or 5 times a power of ten, such that at most TICKS steps fill the range, or as many as have
+     * room. */
     double rough = (high - low) / fmin(TICKS, tall / (2.2 * o->font.height));
     double power = pow(10, floor(log10(rough))), s = rough / power;
     double step = power * (s <= 1 ? 1 : s <= 2 ? 2 : s <= 5 ? 5 : 10);

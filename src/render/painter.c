@@ -287,8 +287,8 @@ static int columns_of(int panel_count)
     return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
 }
 
-/* The part of a panel that its camera frames, and the whole of it: at the sides of a picture the scene continues
- * beneath lines and legend. */
+/* The part of a panel that its camera frames, and the whole of it: at the sides of a picture the scene
+ * continues beneath lines and legend. */
 static rectangle inner_of(const drape_overlay *overlay, const drape_picture *picture, int panel)
 {
     int count = picture->panel_count, columns = columns_of(count), rows = (count + columns - 1) / columns;
@@ -363,7 +363,8 @@ static int put_wrapped(drape_overlay *o, float x, float y, float right, const fl
     return lines;
 }
 
-/* The text before a tab is a name, put in a fainter colour, of the value after it. Returns the number of lines. */
+/* The text before a tab is a name, put in a fainter colour, of the value after it. Returns the number of
+ * lines. */
 static int put_lines(drape_overlay *o, const drape_picture *picture, bool put)
 {
     float left = MARGIN * o->unit, right = picture->column > 0 ? picture->column : (float)o->width - left;

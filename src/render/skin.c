@@ -309,9 +309,9 @@ static void orthogonalize(const float *normal, float *tangent)
     drape_normalize(tangent);
 }
 
-/* A triangle is added to the normals and tangents of its corners weighted by area: the cross product of two sides has
- * twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over the determinant of
- * the texture coordinates, of which only the sign matters. */
+/* A triangle is added to the normals and tangents of its corners weighted by area: the cross product of two
+ * sides has twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over
+ * the determinant of the texture coordinates, of which only the sign matters. */
 static void update_nodes(drape_skin *s, const float *x, const float *values)
 {
     memset(s->normal, 0, 3 * (size_t)s->node_count * sizeof *s->normal);
