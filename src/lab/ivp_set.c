@@ -1,12 +1,12 @@
 /* ivp_set.c: the scenes of the test set: their references and horizons, their files, also for other programs:
  * what these need, and how far their motion is from the reference; see ivp.h. */
-#include "base/hash.h"
+#include "lab/ivp.h"
 
 #include "base/clock.h"
+#include "base/hash.h"
 #include "io/export.h"
 #include "io/json.h"
 #include "io/npy.h"
-#include "lab/ivp.h"
 #include "lab/lab.h"
 #include "lab/text.h"
 #include "model/model.h"
@@ -658,6 +658,7 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     size_t count = 0;
     drape_model *model = NULL;
     json_t *settings;
+    /* The method that measures, with steps that are the same in all runs. */
     const drape_integrator_ops *verlet = lab_find_integrator("verlet");
     double dt = s->interval / STEPS;
     drape_status status = lab_ivp_admits(s, verlet) ? find_dt(s, verlet, STEPS, &dt) : DRAPE_OK;

@@ -372,14 +372,15 @@ static drape_status follow(follower *p)
         drape_status tried = attempt(p, length, &point);
         const double left = p->def->to - p->point.factor;
         const bool last = !tried && left != 0 && p->change * left > 0 && fabs(p->change) >= fabs(left);
-        const double share = (p->def->to - p->point.factor) / p->change;
-        const double limit = limit_of(p);
-        for (size_t i = 0; i < p->n; i++)
-            p->step[i] *= share;
-        p->change = p->def->to - p->point.factor;
-        status = correct(p, CONTROL_LOAD, limit, &point);
-        if (last)
-            tried = (status ? status : examine(p, &point));
+        if (last) { /* the step so far is shortened to end at the last factor */
+            const double share = left / p->change, limit = limit_of(p);
+            for (size_t i = 0; i < p->n; i++)
+                p->step[i] *= share;
+            p->change = left;
+            tried = correct(p, CONTROL_LOAD, limit, &point);
+            if (!tried)
+                tried = examine(p, &point);
+        }
         if (tried < 0)
             return tried;
         if (tried) {

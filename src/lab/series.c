@@ -41,7 +41,8 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
     const lab_levels levels = own ? g->rtols : g->steps;
     drape_status status = DRAPE_OK;
     /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it;
-     * otherwise 0, for none, alone. */
+     * otherwise 0, for none, alone. Each series has one: a line through points of different limits has no
+     * meaning. */
     bool chosen = !lab_has_param(&integrator->entry, "max_order");
     for (size_t i = 0; i < l->def->setting_count; i++)
         chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
@@ -60,24 +61,22 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
                                                    levels.at[i], more});
         }
     }
-    if (!status && !integrator->own_steps && !(g->only_if_implicit && integrator->stability)) {
-        status = DRAPE_OK;
-        for (int c = 0; drape_controllers[c]; c++) {
-            const drape_entry *controller = &drape_controllers[c]->entry;
-            char series[96];
-            if (!lab_has_param(controller, "rtol"))
-                continue;
-            snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
-            for (size_t i = 0; !status && i < g->controlled.count; i++) {
-                json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
-                                         g->first_step);
-                if (g->add)
-                    g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
-                status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
-                                                       "/controller/rtol", NULL, g->controlled.at[i], more});
-            }
+    if (status || own || (g->only_if_implicit && integrator->stability))
+        return status;
+    for (int c = 0; drape_controllers[c]; c++) {
+        const drape_entry *controller = &drape_controllers[c]->entry;
+        char series[96];
+        if (!lab_has_param(controller, "rtol"))
+            continue;
+        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
+        for (size_t i = 0; !status && i < g->controlled.count; i++) {
+            json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
+                                     g->first_step);
+            if (g->add)
+                g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
+            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
+                                                   "/controller/rtol", NULL, g->controlled.at[i], more});
         }
-        status = status;
     }
     return status;
 }

@@ -196,6 +196,7 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
         status = drape_folder_check(*folder, is_cases, NULL, NULL);
     if (!status && !lab_read_text(&arena, path, NAME, &text, &size)) {
         char *rest = NULL;
+        /* A line that is not JSON, as a kill may leave the last, is ignored. */
         for (char *word = strtok_r(text, "\n", &rest); word; word = strtok_r(NULL, "\n", &rest)) {
             json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
             for (size_t i = 0; line && i < count; i++) {

@@ -149,7 +149,8 @@ static void bisect(const drape_model *m, place *places, int64_t n, int first, in
     bisect(m, places + cut, n - cut, first + half, ranks - half, owner);
 }
 
-/* The free nodes, then the pinned ones, so that each rank has some of both. */
+/* owner (node_count): the rank of each node; the same on all ranks, and each rank owns a free node. The free
+ * nodes first, then the pinned ones, so that each rank has some of both. */
 static drape_status partition(const drape_mpi_ranks *r, const drape_model *m, int32_t *owner)
 {
     if (m->free_count < r->base.count)
@@ -171,6 +172,7 @@ static drape_status partition(const drape_mpi_ranks *r, const drape_model *m, in
 
 /* ---- What a part cannot have ---- */
 
+/* Refuses, in one line, a model with something that a part cannot have. */
 static drape_status part_check(const drape_model *m)
 {
     const struct {
@@ -527,6 +529,8 @@ static drape_status make(maker *k, drape_mpi_ranks *ranks)
     return DRAPE_OK;
 }
 
+/* Also sets what of *ranks depends on the part, which uses names, tracks, colliders and choices of `whole`:
+ * that must outlive it. Its large arrays are its own. */
 static drape_status part_create(const drape_model *whole, const int32_t *owner, drape_mpi_ranks *ranks,
                                 drape_model **out)
 {

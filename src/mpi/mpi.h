@@ -1,7 +1,6 @@
 /*
  * mpi.h: a run on several ranks, as the program drives it. Each rank compiles the scene, keeps its part of
- * the model, and steps it with the code of one process; base/ranks.h has what that code
- * exchanges.
+ * the model, and steps it with the code of one process; base/ranks.h has what that code exchanges.
  */
 #ifndef DRAPE_MPI_MPI_H
 #define DRAPE_MPI_MPI_H

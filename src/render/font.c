@@ -148,7 +148,7 @@ static void add_stroke(lines *to, const float (*p)[2], int count, bool smooth)
         float last[2], next[2];
         memcpy(last, b, sizeof last);
         for (int n = 1; n <= (smooth ? PIECES : 1) && to->count < MAX_LINE; n++) {
-            const float s = smooth ? (float)n / PIECES : 1;
+            const float s = smooth ? (float)n / PIECES : 1; /* between b and c */
             for (int k = 0; k < 2; k++)
                 next[k] =
                     0.5f * (2 * b[k] + (c[k] - a[k]) * s + (2 * a[k] - 5 * b[k] + 4 * c[k] - d[k]) * s * s +

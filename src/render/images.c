@@ -82,7 +82,8 @@ static bool in_box(double x, double y, double x0, double y0, double x1, double y
     return x >= x0 && x <= x1 && y >= y0 && y <= y1;
 }
 
-/* Checks with fine lines between them, and the letter in every second light check. */
+/* Checks with fine lines between them, and in every second light check the letter F, which shows left, right,
+ * up and down. */
 static void paint_pattern(double u, double v, void *to)
 {
     static const uint8_t dark[] = {38, 70, 118}, light[] = {232, 226, 212}, red[] = {198, 68, 52},
