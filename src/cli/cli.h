@@ -127,9 +127,26 @@ int cli_report_memory(const cli_command *command);
  * it made the value. Returns the exit code. */
 int cli_print_json(const cli_command *command, json_t *value, size_t flags);
 
+/* ---- Ctrl-C, SIGTERM and SIGHUP: they request a stop, which all stages of a verb check for ---- */
+
+/* After this call the first signal is recorded, and from then on no call of the system waits for longer
+ * than a hundredth of a second, such as a read of a scene from a pipe or a write to one; a second signal
+ * ends the program at once. */
+void cli_catch_signals(void);
+
+bool cli_interrupted(void);
+bool cli_interrupted_by(void *unused); /* the same as a callback of the library */
+
+/* Sets the sim whose step in progress is cancelled half a second after a signal, unless it completes before.
+ * NULL: none. */
+void cli_signals_cancel(drape_sim *sim);
+
+/* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */
+int cli_report_interrupted(const char *verb);
+
 /* ---- Scenes ---- */
 
-/* A context whose scenes, models and sims stop if the program is interrupted (cli/signals.h). */
+/* A context whose scenes, models and sims stop if the program is interrupted. */
 drape_status cli_context_create(drape_context **out);
 
 /* A scene that is ready to run, in the context of its command. All members NULL: no scene. */

@@ -1,7 +1,6 @@
 /* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences; or counts what
  * passes through what in the frames of a run. */
 #include "cli/cli.h"
-#include "cli/signals.h"
 
 #include "assemble/check.h"
 #include "colliders/deformed.h"
@@ -19,55 +18,44 @@ typedef struct check_request {
     int seed; /* 0: not given */
 } check_request;
 
-static int print_comparisons(const drape_check_result *rows, int count)
+/* Ends the line of a count. */
+static void print_first(const drape_intersections *found)
 {
-    int failed = 0;
-    printf("%-20s %-28s %12s %10s\n", "term", "what", "error", "limit");
-    for (int i = 0; i < count; i++) {
+    if (found->count > 0)
+        printf("; the first: edge %d %d, triangle %d %d %d", (int)found->edge[0], (int)found->edge[1],
+               (int)found->triangle[0], (int)found->triangle[1], (int)found->triangle[2]);
+    putchar('\n');
+}
+
+/* Also counts where cloth passes through cloth at the start. It is not a failure, as a scene without
+ * self-contact may have it. */
+static int check(const check_request *request, const cli_scene *in)
+{
+    int count = 0, failed = 0;
+    drape_intersections found;
+    drape_check_result *rows =
+        drape_arena_take(request->command.arena, DRAPE_MAX_CHECK_RESULTS, sizeof *rows);
+    const unsigned seed = request->seed ? (unsigned)request->seed : DEFAULT_SEED;
+    const bool done = rows && !drape_check_derivatives(in->ctx, in->sim->system, seed, rows, &count);
+    if (done)
+        printf("%-20s %-28s %12s %10s\n", "term", "what", "error", "limit");
+    for (int i = 0; done && i < count; i++) {
         printf("%-20s %-28s %12.3e %10.1e  %s\n", rows[i].term, rows[i].what, rows[i].error, rows[i].limit,
                rows[i].pass ? "ok" : "FAILED");
         failed += !rows[i].pass;
     }
-    printf("%d passed, %d failed\n", count - failed, failed);
+    if (done)
+        printf("%d passed, %d failed\n", count - failed, failed);
     fflush(stdout);
     if (failed)
         fprintf(stderr, "drape check: %d of %d comparisons are beyond their limit\n", failed, count);
-    return failed ? CLI_FAILED : CLI_DONE;
-}
-
-static void print_first(const drape_intersections *found)
-{
-    printf("; the first: edge %d %d, triangle %d %d %d", (int)found->edge[0], (int)found->edge[1],
-           (int)found->triangle[0], (int)found->triangle[1], (int)found->triangle[2]);
-}
-
-/* Prints where cloth passes through cloth at the start. It is not a failure, as a scene without self-contact
- * may have it. */
-static drape_status print_intersections(const cli_scene *in)
-{
-    drape_intersections found;
-    drape_status status = drape_find_intersections(in->ctx, in->model, drape_sim_positions(in->sim), &found);
-    if (status)
-        return status;
-    printf("%lld edge-face intersections at the start", (long long)found.count);
-    if (found.count > 0)
-        print_first(&found);
-    putchar('\n');
-    return DRAPE_OK;
-}
-
-static int check(const check_request *request, const cli_scene *in)
-{
-    int count = 0, code = CLI_FAILED;
-    unsigned seed = request->seed ? (unsigned)request->seed : DEFAULT_SEED;
-    drape_check_result *rows =
-        drape_arena_take(request->command.arena, DRAPE_MAX_CHECK_RESULTS, sizeof *rows);
-    bool done = rows && !drape_check_derivatives(in->ctx, in->sim->system, seed, rows, &count);
-    if (done)
-        code = print_comparisons(rows, count);
     if (cli_interrupted())
         return cli_report_interrupted(request->command.verb);
-    return done && !print_intersections(in) ? code : cli_report(&request->command, CLI_FAILED);
+    if (!done || drape_find_intersections(in->ctx, in->model, drape_sim_positions(in->sim), &found))
+        return cli_report(&request->command, CLI_FAILED);
+    printf("%lld edge-face intersections at the start", (long long)found.count);
+    print_first(&found);
+    return failed ? CLI_FAILED : CLI_DONE;
 }
 
 /* ---- The frames of a run ---- */
@@ -79,21 +67,6 @@ typedef struct tally {
     int64_t worst, count; /* the frame with the largest number of intersections and triangles inside */
     double deepest;       /* [m] in any frame */
 } tally;
-
-/* Prints where cloth passes through itself. Returns the number of intersections. */
-static drape_status check_cloth(const tally *t, int64_t frame, double time, const double *x, int64_t *sum)
-{
-    drape_intersections found;
-    const drape_status status = drape_find_intersections(t->in->ctx, t->in->model, x, &found);
-    if (status || found.count == 0)
-        return status;
-    *sum += found.count;
-    printf("frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself", (long long)frame,
-           time, (long long)found.count);
-    print_first(&found);
-    putchar('\n');
-    return DRAPE_OK;
-}
 
 static drape_status check_collider(tally *t, int32_t collider, int64_t frame, double time, const double *x,
                                    int64_t *sum)
@@ -120,10 +93,16 @@ static drape_status check_collider(tally *t, int32_t collider, int64_t frame, do
 
 static drape_status check_frame(tally *t, const drape_record *run, int64_t frame, double *x)
 {
-    int64_t sum = 0;
+    drape_intersections found = {.count = 0};
     drape_status status = drape_record_read(run, frame, x);
     if (!status)
-        status = check_cloth(t, frame, run->times[frame], x, &sum);
+        status = drape_find_intersections(t->in->ctx, t->in->model, x, &found);
+    int64_t sum = status ? 0 : found.count;
+    if (sum > 0) {
+        printf("frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself", (long long)frame,
+               run->times[frame], (long long)sum);
+        print_first(&found);
+    }
     for (int32_t c = 0; !status && c < t->in->model->collider_count; c++)
         status = check_collider(t, c, frame, run->times[frame], x, &sum);
     t->crossed += sum > 0;

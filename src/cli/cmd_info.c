@@ -1,9 +1,17 @@
 /* cmd_info.c: `drape info`: show what a scene models and what it costs, as JSON or for reading: a line for
  * each value, in the order of the object. Lists are in one line, but those of objects with names. Empty lists
  * are left out. */
+#include "cli/cli.h"
 #include "cli/form.h"
-#include "cli/info.h"
 
+#include "colliders/deformed.h"
+#include "compile/compile.h"
+#include "events/events.h"
+#include "io/json.h"
+#include "mesh/mesh.h"
+#include "sim/profile.h"
+
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,6 +23,449 @@ typedef struct info_request {
     cli_command command;
     bool json;
 } info_request;
+
+/* ---- As an object of described values (cli/form.h); what the scene does not model has no key ---- */
+
+typedef struct info {
+    const cli_command *command;
+    const drape_model *model;
+    const drape_sim *sim;
+    bool derived;
+    drape_scene_def def; /* what the model was compiled from */
+    drape_profile profile;
+    int32_t *inside; /* nodes at t = 0, for each collider of the model */
+} info;
+
+static json_t *count(int64_t value)
+{
+    return json_integer((json_int_t)value);
+}
+
+static json_t *number(double value, const char *unit)
+{
+    return cli_described(drape_json_number(value), unit);
+}
+
+/* Adds a list unless it is empty. */
+static json_t *with_list(json_t *object, const char *key, json_t *list)
+{
+    if (json_array_size(list) > 0 || !list)
+        return drape_json_with(object, key, list);
+    json_decref(list);
+    return object;
+}
+
+/* An array of what is made of each index. */
+static json_t *list_of(const info *in, size_t count, json_t *(*make)(const info *in, int32_t index))
+{
+    json_t *list = json_array();
+    for (size_t i = 0; i < count; i++)
+        list = drape_json_append(list, make(in, (int32_t)i));
+    return list;
+}
+
+/* ---- Colliders, contact, events, seams ---- */
+
+/* Adds the name of an entry, what it is, and its parameters. */
+static json_t *with_entry(json_t *object, const drape_entry *entry, const double *values,
+                          const drape_choice *choice)
+{
+    object = drape_json_with(object, "type", json_string(entry->name));
+    object = drape_json_with(object, "summary", json_string(entry->summary));
+    return drape_json_with(object, "parameters",
+                           cli_params_json(entry->params, entry->param_count, values, choice));
+}
+
+static json_t *named(const char *name)
+{
+    return drape_json_with(json_object(), "name", drape_json_text(name));
+}
+
+static drape_status count_inside(const drape_sim *sim, int32_t index, int32_t *inside)
+{
+    const drape_collider *collider;
+    drape_arena arena = drape_arena_of(sim->ctx);
+    const drape_status status =
+        drape_deformed_at(&arena, sim->model, NULL, index, drape_sim_time(sim), &collider);
+    *inside = 0;
+    const double *x = drape_sim_positions(sim);
+    const drape_collider_pose pose =
+        drape_collider_pose_at(&sim->model->colliders[index], drape_sim_time(sim));
+    for (int32_t i = 0; !status && i < sim->model->node_count; i++)
+        *inside += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
+    drape_arena_free(&arena);
+    return status;
+}
+
+static json_t *collider(const info *in, int32_t c)
+{
+    const drape_collider *from = &in->model->colliders[c];
+    const drape_collider_def *def = &in->def.colliders[c];
+    json_t *object = with_entry(named(from->name), &from->ops->entry, from->values, &from->choice);
+    object = cli_with_keys(object, &drape_form_collider, def);
+    json_t *moves = cli_form_json(&drape_form_collider, def);
+    if (from->track.key_count > 0)
+        object = drape_json_with(object, "track", json_incref(json_object_get(moves, "track")));
+    if (from->turns.key_count > 0) {
+        object = drape_json_with(object, "turns", json_incref(json_object_get(moves, "turns")));
+        object = drape_json_with(object, "pivot", cli_described(drape_json_numbers(from->pivot, 3), "m"));
+    }
+    json_decref(moves);
+    object = drape_json_with(object, "points", count(from->shape.point_count));
+    object = drape_json_with(object, "segments", count(from->shape.segment_count));
+    object = drape_json_with(object, "triangles", count(from->shape.triangle_count));
+    return drape_json_with(object, "nodes_inside", count(in->inside[c]));
+}
+
+static json_t *event(const info *in, int32_t i)
+{
+    const drape_model_event *from = &in->model->events[i];
+    json_t *object = with_entry(named(from->name), &from->ops->entry, from->values, &from->choice);
+    object = cli_with_keys(object, &drape_form_event, &in->def.events[i]);
+    return drape_json_with(object, "pinned_nodes", count(from->pinned_count));
+}
+
+static json_t *seam(const info *in, int32_t i)
+{
+    const drape_model_seam *from = &in->model->seams[i];
+    const drape_term *term = &in->model->terms[from->term];
+    json_t *object = with_entry(named(from->name), &term->ops->entry, term->params, &from->choice);
+    object = drape_json_with(object, "pairs", count(from->pair_count));
+    object = drape_json_with(object, "a", drape_json_text(in->model->cloths[from->cloth[0]].name));
+    return drape_json_with(object, "b", drape_json_text(in->model->cloths[from->cloth[1]].name));
+}
+
+/* Of an integrator that moves nodes in place of contact forces, only the thickness acts. */
+static json_t *with_contact(json_t *object, const info *in)
+{
+    double values[DRAPE_MAX_PARAMS];
+    const drape_model *model = in->model;
+    const bool forces = !in->sim->chosen.integrator->projects_contact;
+    if (forces && (model->collider_count > 0 || model->contact.self)) {
+        drape_contact_values(&model->contact, values);
+        object = drape_json_with(
+            object, "contact",
+            cli_params_json(drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, values, &model->contact_choice));
+    }
+    if (model->contact.self) {
+        drape_self_contact_values(&model->contact, values);
+        object = drape_json_with(object, "self_contact",
+                                 cli_params_json(drape_self_contact_params,
+                                                 forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                                                 values, &model->self_choice));
+    }
+    if (model->untangle.given) {
+        drape_untangle_values(&model->untangle, values);
+        object = drape_json_with(object, "untangle",
+                                 cli_params_json(drape_untangle_params, DRAPE_UNTANGLE_PARAM_COUNT, values,
+                                                 &model->untangle_choice));
+    }
+    return object;
+}
+
+static json_t *chosen(const info *in, const drape_entry *entry, const double *values,
+                      const drape_choice *choice,
+                      bool (*ignores)(const drape_chosen *chosen, const char *name))
+{
+    json_t *ignored = json_array();
+    for (size_t i = 0; i < choice->setting_count; i++)
+        if (ignores(&in->sim->chosen, choice->settings[i].name))
+            ignored = drape_json_append(ignored, drape_json_text(choice->settings[i].name));
+    return drape_json_with(with_entry(json_object(), entry, values, choice), "ignored", ignored);
+}
+
+/* ---- Cloths and terms ---- */
+
+/* The nodes that the pin selects are in place of how it selects them, and the triangles that carry them, in
+ * their order, in place of the one that is given. */
+static json_t *pin(const info *in, const drape_pin *pin, const drape_pin_def *def)
+{
+    const drape_model *model = in->model;
+    const int32_t first = pin->node_count > 0 ? pin->node[0] : -1;
+    json_t *object = cli_form_json(&drape_form_pin, def), *nodes = json_array(), *triangles = json_array();
+    for (int i = 0; object && drape_form_pin.one_of[i]; i++)
+        json_object_del(object, drape_form_pin.one_of[i]);
+    for (int32_t i = 0; i < pin->node_count; i++) {
+        nodes = drape_json_append(nodes, count(pin->node[i] - model->cloths[pin->cloth].first_node));
+        if (def->attach && model->ride[first].triangle >= 0)
+            triangles = drape_json_append(triangles, count(model->ride[pin->node[i]].triangle));
+    }
+    object = drape_json_with(object, "nodes", nodes);
+    object = drape_json_with(object, "name", drape_json_text(pin->name));
+    if (json_array_size(triangles) > 0)
+        json_object_del(object, "triangle");
+    object = with_list(object, "triangles", triangles);
+    for (int32_t i = 0; def->turn_count > 0 && i < model->moved_count; i++)
+        if (model->moved_node[i] == first && model->moved_track[i] >= 0)
+            object = drape_json_with(
+                object, "pivot",
+                cli_described(drape_json_numbers(model->tracks[model->moved_track[i]].pivot, 3), "m"));
+    return object;
+}
+
+static json_t *pins(const info *in, int32_t c)
+{
+    const drape_cloth_def *def = &in->def.cloths[c];
+    const drape_pin *first = in->model->pins;
+    json_t *list = json_array();
+    for (int32_t i = 0; i < c; i++)
+        first += in->def.cloths[i].pin_count;
+    for (size_t i = 0; i < def->pin_count; i++)
+        list = drape_json_append(list, pin(in, &first[i], &def->pins[i]));
+    return list;
+}
+
+/* Adds how the cloth starts unless it is at rest. */
+static json_t *with_start(json_t *object, const drape_cloth_def *def)
+{
+    const drape_scene_object *form = drape_scene_key_of(&drape_form_cloth, "start")->child;
+    drape_start_def defaults = {.file = NULL};
+    drape_scene_set_defaults(form, &defaults);
+    json_t *start = cli_form_json(form, &def->start), *rest = cli_form_json(form, &defaults);
+    if (!json_equal(start, rest))
+        object = drape_json_with(object, "start", json_incref(start));
+    json_decref(start);
+    json_decref(rest);
+    return object;
+}
+
+/* The grid of a mesh with its values in *object, which is empty without one. The settings were valid when the
+ * model was compiled. */
+static const drape_grid_ops *grid(const info *in, const drape_entry_def *def, json_t **object)
+{
+    double values[DRAPE_MAX_PARAMS];
+    const int i = drape_registry_find(&drape_grid_registry, NULL, def->type ? def->type : "");
+    const drape_entry *entry = i < 0 ? NULL : &drape_grids[i]->entry;
+    if (!entry || drape_params_resolve(in->sim->ctx, "", entry, def->settings, def->setting_count, values))
+        entry = NULL;
+    *object = entry ? cli_values_json(entry, values, in->derived) : json_object();
+    return entry ? drape_grids[i] : NULL;
+}
+
+static json_t *mesh(const info *in, const drape_cloth *cloth, const drape_mesh_def *def)
+{
+    json_t *object;
+    const drape_grid_ops *from = grid(in, &def->grid, &object);
+    if (from)
+        object = drape_json_with(object, "grid", drape_json_text(from->entry.name));
+    if (cloth->file)
+        object = drape_json_with(object, "file", drape_json_text(cloth->file));
+    return drape_json_with(object, "transform", cli_with_keys(json_object(), &drape_form_transform, def));
+}
+
+static json_t *render_mesh(const info *in, int32_t c)
+{
+    const drape_cloth *cloth = &in->model->cloths[c];
+    const drape_render_mesh_def *def = &in->def.cloths[c].render_mesh;
+    json_t *object, *keys = cli_form_json(drape_scene_key_of(&drape_form_cloth, "render_mesh")->child, def);
+    grid(in, &def->mesh.grid, &object);
+    json_object_update(object, keys);
+    json_decref(keys);
+    object = drape_json_with(object, "max_distance", number(cloth->max_distance, "m"));
+    object = drape_json_with(object, "vertices", count(cloth->render_mesh.node_count));
+    return drape_json_with(object, "triangles", count(cloth->render_mesh.triangle_count));
+}
+
+/* Adds a stiffness of a measured fabric unless it is that of an isotropic material. */
+static json_t *with_woven(json_t *object, const char *key, const drape_woven *w, const char *unit,
+                          const char *shear)
+{
+    if (!(w->warp > 0))
+        return object;
+    json_t *woven =
+        json_pack("{s:o, s:o, s:o, s:o}", "warp", number(w->warp, unit), "weft", number(w->weft, unit), shear,
+                  number(w->shear, unit), "poisson", drape_json_number(w->poisson));
+    return drape_json_with(object, key, woven);
+}
+
+static json_t *material(const info *in, const drape_cloth *cloth)
+{
+    const drape_material *m = &cloth->material;
+    json_t *object = cli_values_json(&drape_material_entry, cloth->material_values, in->derived);
+    object = drape_json_with(object, "areal_density", number(m->areal_density, "kg/m2"));
+    object = drape_json_with(object, "membrane_stiffness", number(m->membrane_stiffness, "N/m"));
+    object = drape_json_with(object, "flexural_rigidity", number(m->flexural_rigidity, "N m"));
+    object = with_woven(object, "tension", &cloth->tension, "N/m", "shear");
+    return with_woven(object, "bending", &cloth->bending, "N m", "twist");
+}
+
+static json_t *cloth(const info *in, int32_t c)
+{
+    const drape_cloth *from = &in->model->cloths[c];
+    const drape_cloth_def *def = &in->def.cloths[c];
+    const int32_t first = from->first_node, end = first + from->mesh.node_count;
+    int32_t pinned = 0, moved = 0, supported = 0; /* nodes; supported: held in some directions only */
+    double mass = 0, area = 0;
+    for (int32_t i = first; i < end; i++)
+        pinned += in->model->pinned[i];
+    for (int32_t i = 0; i < in->model->moved_count; i++)
+        moved += in->model->moved_node[i] >= first && in->model->moved_node[i] < end;
+    for (int32_t i = 0; i < in->model->support_count; i++)
+        supported += in->model->supports[i].node >= first && in->model->supports[i].node < end;
+    for (int32_t i = first; i < end; i++)
+        mass += in->model->mass[i];
+    for (int32_t t = 0; t < from->mesh.triangle_count; t++)
+        area += from->mesh.triangle_area[t];
+    json_t *object = drape_json_with(named(from->name), "nodes", count(from->mesh.node_count));
+    object = drape_json_with(object, "triangles", count(from->mesh.triangle_count));
+    object = drape_json_with(object, "edges", count(from->mesh.edge_count));
+    object = drape_json_with(object, "mesh", mesh(in, from, &def->mesh));
+    object = drape_json_with(object, "mass", number(mass, "kg"));
+    object = drape_json_with(object, "area", number(area, "m2"));
+    object = cli_with_keys(object, &drape_form_cloth, def);
+    object = drape_json_with(object, "pinned", count(pinned));
+    object = drape_json_with(object, "moved", count(moved));
+    object = drape_json_with(object, "supported", count(supported));
+    object = with_list(object, "pins", pins(in, c));
+    object = with_list(object, "masses", cli_forms_json(&drape_form_mass, def->masses, def->mass_count));
+    object = with_list(object, "periodic",
+                       cli_forms_json(&drape_form_periodic, def->periodic, def->periodic_count));
+    object = with_start(object, def);
+    if (from->bound)
+        object = drape_json_with(object, "render_mesh", render_mesh(in, c));
+    return drape_json_with(object, "material", material(in, from));
+}
+
+static json_t *term(const info *in, int32_t i)
+{
+    const drape_term *from = &in->model->terms[i];
+    const drape_profile_term *cost = &in->profile.terms[i];
+    const double seconds = cost->residual_seconds + cost->jacobian_seconds;
+    json_t *object = named(from->ops->entry.name);
+    object = drape_json_with(object, from->seam < 0 ? "cloth" : "seam",
+                             drape_json_text(from->seam < 0 ? in->model->cloths[from->cloth].name
+                                                            : in->model->seams[from->seam].name));
+    if (from->ops->law)
+        object = drape_json_with(object, "acts_on", count(cost->acts_on));
+    object = drape_json_with(object, "element", json_string(from->ops->element_name));
+    object = drape_json_with(object, "elements", count(from->elements.count));
+    object = drape_json_with(object, "nodes_an_element", count(from->elements.nodes));
+    object = drape_json_with(object, "nonzeros", count(cost->nonzeros));
+    object = drape_json_with(object, "bytes", count((int64_t)cost->bytes));
+    object = drape_json_with(object, "residual_s", drape_json_number(cost->residual_seconds));
+    object = drape_json_with(object, "jacobian_s", drape_json_number(cost->jacobian_seconds));
+    object = drape_json_with(object, "share",
+                             drape_json_number(seconds / fmax(drape_profile_seconds(&in->profile), 1e-300)));
+    json_t *parameters =
+        cli_params_json(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
+    if (from->history && *from->history->name)
+        json_object_set_new(json_object_get(parameters, "history"), "value",
+                            drape_json_text(from->history->name));
+    return drape_json_with(object, "parameters", parameters);
+}
+
+/* ---- Costs ---- */
+
+static json_t *iteration(const info *in)
+{
+    const drape_profile *p = &in->profile;
+    double outside = p->residual_seconds + p->jacobian_seconds;
+    for (int32_t i = 0; i < in->model->term_count; i++)
+        outside -= p->terms[i].residual_seconds + p->terms[i].jacobian_seconds;
+    json_t *object = drape_json_with(json_object(), "residual_s", drape_json_number(p->residual_seconds));
+    object = drape_json_with(object, "jacobian_s", drape_json_number(p->jacobian_seconds));
+    object = drape_json_with(object, "factor_s", drape_json_number(p->factor_seconds));
+    object = drape_json_with(object, "solve_s", drape_json_number(p->solve_seconds));
+    object = drape_json_with(object, "total_s", drape_json_number(drape_profile_seconds(p)));
+    object = drape_json_with(object, "outside_terms_s", drape_json_number(fmax(outside, 0)));
+    object = drape_json_with(object, "implicit", json_boolean(p->implicit));
+    object = drape_json_with(object, "factored", json_boolean(p->implicit && !p->factor_status));
+    object = drape_json_with(object, "linear_solver", json_string(p->linear_solver));
+    object = drape_json_with(object, "linear_picked", json_string(p->linear_picked));
+    object = drape_json_with(object, "linear_why", json_string(p->linear_why));
+    object = drape_json_with(object, "linear_fell_back", json_boolean(p->linear_fallback[0]));
+    return drape_json_with(object, "linear_fallback", json_string(p->linear_fallback));
+}
+
+static json_t *bytes(const info *in)
+{
+    const drape_profile *p = &in->profile;
+    const size_t sum = drape_profile_bytes(p);
+    json_t *object = drape_json_with(json_object(), "model", count((int64_t)p->model_bytes));
+    object = drape_json_with(object, "meshes", count((int64_t)p->mesh_bytes));
+    object = drape_json_with(object, "sparsity", count((int64_t)p->pattern_bytes));
+    object = drape_json_with(object, "evaluation", count((int64_t)p->system_bytes));
+    object = drape_json_with(object, "integrator", count((int64_t)p->integrator_bytes));
+    object = drape_json_with(object, "state", count((int64_t)p->state_bytes));
+    object = drape_json_with(object, "total", count((int64_t)sum));
+    return drape_json_with(object, "a_node", drape_json_number((double)sum / in->model->node_count));
+}
+
+/* At the start, of a step of the integrator's dt, if it has a stability limit. An infinite one becomes
+ * null. */
+static json_t *with_stability(json_t *object, const info *in)
+{
+    drape_stability s;
+    if (!in->sim->chosen.integrator->stability)
+        return object;
+    in->sim->chosen.integrator->stability(in->sim->integrator, drape_sim_state(in->sim), in->profile.dt, &s);
+    json_t *limit = drape_json_with(json_object(), "omega", number(s.omega, "rad/s"));
+    limit = drape_json_with(limit, "damping", number(s.damping, "1/s"));
+    limit = drape_json_with(limit, "limit", number(s.limit, "s"));
+    limit = drape_json_with(limit, "substep", number(s.substep, "s"));
+    limit = drape_json_with(limit, "share", drape_json_number(s.substep / s.limit));
+    limit = drape_json_with(limit, "stable", json_boolean(s.substep <= s.limit));
+    return drape_json_with(object, "stability", limit);
+}
+
+/* ---- All of it ---- */
+
+static json_t *scene(const info *in)
+{
+    const drape_model *model = in->model;
+    const drape_chosen *all = &in->sim->chosen;
+    /* frames at k / rate up to the end, and one at the end if none of them is there */
+    const double intervals = model->duration * model->frame_rate, whole = floor(intervals + 1e-9);
+    const int64_t frames = (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
+    json_t *object = drape_json_with(json_object(), "scene", drape_json_text(in->command->operand));
+    object = cli_with_keys(object, &drape_form_scene, &in->def);
+    object = cli_with_keys(object, &drape_form_output, &in->def);
+    object = drape_json_with(object, "frames", count(frames));
+    object = drape_json_with(object, "nodes", count(model->node_count));
+    object = drape_json_with(object, "free", count(model->free_count));
+    object = drape_json_with(object, "dofs", count(model->pattern.n));
+    object = drape_json_with(object, "nnz", count(model->pattern.nonzeros));
+    object = drape_json_with(object, "tolerance", number(drape_sim_statistics(in->sim).tolerance, "N"));
+    object = drape_json_with(object, "cloths", list_of(in, (size_t)model->cloth_count, cloth));
+    object = with_list(object, "colliders", list_of(in, (size_t)model->collider_count, collider));
+    object = with_contact(object, in);
+    object = with_list(object, "events", list_of(in, (size_t)model->event_count, event));
+    object = drape_json_with(object, "seams", list_of(in, (size_t)model->seam_count, seam));
+    object = with_list(object, "histories",
+                       cli_forms_json(&drape_form_history, in->def.histories, in->def.history_count));
+    object = drape_json_with(object, "integrator",
+                             chosen(in, &all->integrator->entry, all->integrator_values, &model->integrator,
+                                    drape_chosen_ignores_integrator));
+    object = drape_json_with(object, "controller",
+                             chosen(in, &all->controller->entry, all->controller_values, &model->controller,
+                                    drape_chosen_ignores_controller));
+    object = with_stability(object, in);
+    object = drape_json_with(object, "terms", list_of(in, (size_t)model->term_count, term));
+    object = drape_json_with(object, "iteration", iteration(in));
+    return drape_json_with(object, "bytes", bytes(in));
+}
+
+/* derived: also values of meshes and materials that follow from others. *out is NULL, or errno ENOMEM, if
+ * memory ran out. */
+static drape_status make_info(const cli_command *command, const cli_scene *in, bool derived, json_t **out)
+{
+    info all = {.command = command, .model = in->model, .sim = in->sim, .derived = derived};
+    drape_profile_term *terms =
+        drape_arena_take(command->arena, (size_t)in->model->term_count, sizeof *terms);
+    all.inside = drape_arena_take(command->arena, (size_t)in->model->collider_count, sizeof *all.inside);
+    drape_status status = drape_arena_status(command->arena);
+    for (int32_t c = 0; !status && c < in->model->collider_count; c++)
+        status = count_inside(in->sim, c, &all.inside[c]);
+    if (!status)
+        status = drape_scene_to_def(in->scene, &all.def);
+    if (!status)
+        status = drape_profile_measure(in->ctx, in->sim, terms, &all.profile);
+    errno = 0;
+    *out = status ? NULL : scene(&all);
+    return status;
+}
+
+/* ---- For reading ---- */
 
 typedef struct line {
     char text[MAX_WRITTEN + 1];
@@ -129,29 +580,25 @@ static void print_object(int indent, json_t *object)
     }
 }
 
-static int print(const cli_command *command, bool json, json_t *object)
-{
-    if (json) {
-        cli_make_plain(object);
-        return cli_print_json(command, object, JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
-    }
-    const bool whole = object && !drape_memory_ran_out();
-    if (whole)
-        print_object(0, object);
-    json_decref(object);
-    return whole ? CLI_DONE : cli_report_memory(command);
-}
-
 static int run(const void *command)
 {
     const info_request *request = command;
+    const cli_command *common = &request->command;
     cli_scene in;
-    json_t *object;
-    int code = cli_scene_load(&request->command, request->command.operand, &in);
-    if (code == CLI_GO_ON)
-        code = cli_info_json(&request->command, &in, !request->json, &object)
-                   ? cli_report(&request->command, CLI_FAILED)
-                   : print(&request->command, request->json, object);
+    json_t *object = NULL;
+    int code = cli_scene_load(common, common->operand, &in);
+    const bool loaded = code == CLI_GO_ON;
+    if (loaded && make_info(common, &in, !request->json, &object)) {
+        code = cli_report(common, CLI_FAILED);
+    } else if (loaded && request->json) {
+        cli_make_plain(object);
+        code = cli_print_json(common, object, JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
+    } else if (loaded) {
+        code = object && !drape_memory_ran_out() ? CLI_DONE : cli_report_memory(common);
+        if (code == CLI_DONE)
+            print_object(0, object);
+        json_decref(object);
+    }
     cli_scene_free(&in);
     return code;
 }

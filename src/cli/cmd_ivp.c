@@ -1,6 +1,5 @@
 /* cmd_ivp.c: `drape ivp`: the test set of initial value problems: horizons, references, runs, scores. */
 #include "cli/lab.h"
-#include "cli/signals.h"
 #include "lab/ivp.h"
 
 #include <stdlib.h>
@@ -57,53 +56,34 @@ static const struct {
 };
 #define ACTIONS (sizeof actions / sizeof *actions)
 
-/* The methods over the scenes. */
-static int run_scenes(const ivp_request *request)
-{
-    cli_lab_request lab = request->lab;
-    lab.command.operands++;
-    lab.command.operand_count--;
-    lab.command.operand = lab.command.operands[0];
-    return cli_lab_run(&lab, 1, 0);
-}
-
-/* Failures of a scene, of a file that is read and of the output folder are bad input. */
-static int code_of(const cli_command *command, drape_status status)
-{
-    if (status == DRAPE_E_STOPPED)
-        return cli_report_interrupted(command->verb);
-    return cli_report(command,
-                      status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED : CLI_BAD_INPUT);
-}
-
-static int do_scene(const ivp_request *request, ivp_deed *deed, const char *scene, const char *more)
-{
-    const cli_command *command = &request->lab.command;
-    drape_arena arena = drape_arena_of(command->ctx);
-    lab_ivp s = {0};
-    bool good = true;
-    drape_status status = lab_ivp_open(&arena, scene, &s);
-    s.cancel = cli_interrupted_by;
-    if (!status)
-        status = deed(&s, request, more, &good);
-    lab_ivp_close(&s);
-    fflush(stdout);
-    const int code = status ? code_of(command, status) : good ? CLI_GO_ON : CLI_FAILED;
-    drape_arena_free(&arena);
-    return code;
-}
-
+/* Does the deed with each scene. Failures of a scene, of a file that is read and of the output folder are bad
+ * input. */
 static int do_scenes(const ivp_request *request, size_t action)
 {
     const cli_command *command = &request->lab.command;
-    int code = CLI_GO_ON, worst = CLI_DONE;
     const int scenes = actions[action].operands ? 1 : command->operand_count - 1;
-    for (int i = 1; i <= scenes && code != CLI_INTERRUPTED; i++) {
+    const char *more = actions[action].operands == 2 ? command->operands[2] : NULL;
+    int worst = CLI_DONE;
+    for (int i = 1; i <= scenes && worst != CLI_INTERRUPTED; i++) {
+        drape_arena arena = drape_arena_of(command->ctx);
+        lab_ivp s = {0};
+        bool good = true;
         if (scenes > 1)
             puts(CLI_SHOWN(command->operands[i]));
-        code = do_scene(request, actions[action].deed, command->operands[i],
-                        actions[action].operands == 2 ? command->operands[2] : NULL);
+        drape_status status = lab_ivp_open(&arena, command->operands[i], &s);
+        s.cancel = cli_interrupted_by;
+        if (!status)
+            status = actions[action].deed(&s, request, more, &good);
+        lab_ivp_close(&s);
+        fflush(stdout);
+        int code = good ? CLI_DONE : CLI_FAILED;
+        if (status == DRAPE_E_STOPPED)
+            code = cli_report_interrupted(command->verb);
+        else if (status)
+            code = cli_report(command, status == DRAPE_E_SOLVER || status == DRAPE_E_MEMORY ? CLI_FAILED
+                                                                                            : CLI_BAD_INPUT);
         worst = code > worst ? code : worst;
+        drape_arena_free(&arena);
     }
     return worst;
 }
@@ -126,7 +106,13 @@ static int run(const void *given)
         return cli_misuse("ivp", "--json has no effect: only score prints JSON");
     if (actions[i].deed == export && !request->lab.out)
         return cli_misuse("ivp", "--out is missing: the folder of the export");
-    return actions[i].deed ? do_scenes(request, i) : run_scenes(request);
+    if (actions[i].deed)
+        return do_scenes(request, i);
+    cli_lab_request lab = request->lab; /* the methods over the scenes */
+    lab.command.operands++;
+    lab.command.operand_count--;
+    lab.command.operand = lab.command.operands[0];
+    return cli_lab_run(&lab, 1, 0);
 }
 
 static const cli_option options[] = {
@@ -138,8 +124,8 @@ static const cli_option options[] = {
         "limit of wall-clock time; the least informative cases are left out and named (default none)", budget,
         0),
     {"check", CLI_FLAG, NULL, "reference: compare with the stored one instead of storing it",
-     offsetof(ivp_request, check), 0, NULL},
-    {"json", CLI_FLAG, NULL, "score: print JSON", offsetof(ivp_request, json), 0, NULL},
+     offsetof(ivp_request, check)},
+    {"json", CLI_FLAG, NULL, "score: print JSON", offsetof(ivp_request, json)},
 };
 
 const drape_verb drape_verb_ivp = {

@@ -1,17 +1,29 @@
 /* cmd_list.c: `drape list`: the keys of a scene and the tables of the library, as text, as Markdown, and as
  * the schema of a scene. */
 #include "cli/cli.h"
-#include "cli/keys.h"
 #include "cli/schema.h"
-#include "cli/tables.h"
 
 #include "base/param.h"
+#include "base/reason.h"
+#include "colliders/colliders.h"
+#include "compile/compile.h"
+#include "compile/fabrics.h"
+#include "control/control.h"
+#include "events/events.h"
+#include "fields/fields.h"
+#include "io/export.h"
+#include "mesh/sequence.h"
+#include "render/shading.h"
+#include "solvers/linear.h"
+#include "terms/terms.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES 256
+#define MAX_NAMES   256
+#define MAX_OBJECTS 32
+#define MAX_FABRICS 64
 
 typedef struct list_request {
     cli_command command;
@@ -21,7 +33,13 @@ typedef struct list_request {
 #define SCENE_NAME  "scene" /* the keys of a scene, which are not in a table */
 #define SCENE_TITLE "The scene file"
 
-/* How a table is printed. */
+/* An object of a scene that has keys of its own. */
+typedef struct cli_object {
+    const drape_scene_object *form;
+    char pointer[64]; /* "/cloth/N/mesh"; "" for the scene itself */
+} cli_object;
+
+/* How a table is printed; NULL: nothing is. */
 typedef struct list_style {
     void (*scene)(void);
     void (*object)(const cli_object *object);
@@ -66,12 +84,73 @@ static param_text text_of_key(const cli_object *object, const drape_scene_key *k
     return text;
 }
 
-/* ---- As text ---- */
+/* ---- What there is ---- */
 
-static void nothing(const drape_registry *table)
+/* Adds an object and those inside it, in the order of their keys. Returns how many there are then. */
+static int add_objects(cli_object *objects, int count, const drape_scene_object *form, const char *pointer)
 {
-    (void)table;
+    if (count == MAX_OBJECTS || form->key_count == 0)
+        return count;
+    cli_object *object = &objects[count++];
+    object->form = form;
+    snprintf(object->pointer, sizeof object->pointer, "%s", pointer);
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        const bool array = key->shape == DRAPE_SCENE_OBJECTS || key->shape == DRAPE_SCENE_ENTRIES;
+        char inside[sizeof object->pointer];
+        snprintf(inside, sizeof inside, "%.40s/%.18s%s", pointer, key->param.name, array ? "/N" : "");
+        if (key->child)
+            count = add_objects(objects, count, key->child, inside);
+    }
+    return count;
 }
+
+/* The published values of a fabric, as drape_fabric has them, and derived ones in place of those not
+ * published. */
+static void describe(const drape_fabric *f, char *text, size_t size)
+{
+    drape_woven tension, bending;
+    drape_fabric_tension(f, &tension);
+    drape_fabric_bending(f, &bending);
+    int used = snprintf(text, size, "%s: %.4g kg/m2", f->what, f->areal_density);
+    used += snprintf(text + used, size - (size_t)used,
+                     isnan(f->tension.warp) ? "" : "; tension %.4g, %.4g N/m, shear %.3g N/m", tension.warp,
+                     tension.weft, tension.shear);
+    used += snprintf(text + used, size - (size_t)used, "; bending %.3g, %.3g, twist %.3g uN m",
+                     1e6 * bending.warp, 1e6 * bending.weft, 1e6 * bending.shear);
+    snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g", f->drape);
+}
+
+/* The summaries of fabrics are made from numbers, so list_tables fills in the entries. */
+static const drape_entry *fabrics[MAX_FABRICS + 1];
+static const drape_registry fabric_registry = {
+    "fabric", "fabrics", "Measured fabrics", "\"fabric\" of a material", fabrics, NULL};
+
+static const drape_registry *const tables[] = {&drape_grid_registry,       &drape_import_registry,
+                                               &drape_material_registry,   &fabric_registry,
+                                               &drape_term_registry,       &drape_collider_registry,
+                                               &drape_sequence_registry,   &drape_event_registry,
+                                               &drape_seam_registry,       &drape_self_contact_registry,
+                                               &drape_contact_registry,    &drape_untangle_registry,
+                                               &drape_integrator_registry, &drape_controller_registry,
+                                               &drape_linear_registry,     &drape_exporter_registry,
+                                               &drape_reason_registry,     &drape_field_registry,
+                                               &drape_shading_registry,    NULL};
+
+static const drape_registry *const *list_tables(void)
+{
+    static char summaries[MAX_FABRICS][256];
+    static drape_entry entries[MAX_FABRICS];
+    for (int i = 0; i < MAX_FABRICS && drape_fabrics[i + 1].name; i++) { /* the first fabric is "none" */
+        const drape_fabric *f = &drape_fabrics[i + 1];
+        describe(f, summaries[i], sizeof summaries[i]);
+        entries[i] = (drape_entry){.name = f->name, .summary = summaries[i], .reference = f->source};
+        fabrics[i] = &entries[i];
+    }
+    return tables;
+}
+
+/* ---- As text ---- */
 
 static bool is_shown(const drape_entry *entry, const char *only)
 {
@@ -141,13 +220,6 @@ static void cell(const char *text)
     fputs(" |", stdout);
 }
 
-static void code_cell(const char *text)
-{
-    char code[160];
-    snprintf(code, sizeof code, "`%s`", text);
-    cell(code);
-}
-
 static void names_cell(const char *const *names, int count)
 {
     fputs(" ", stdout);
@@ -166,7 +238,7 @@ static void markdown_cells(const char *const *of, int count, const char *name, c
 {
     fputs("|", stdout);
     names_cell(of, count);
-    code_cell(name);
+    names_cell(&name, 1);
     cell(text->unit);
     cell(text->value);
     cell(text->takes);
@@ -202,35 +274,25 @@ static param_text text_of_row(const cli_object *object, const drape_scene_key *k
     return text;
 }
 
-static bool has_same_key(const cli_object *object, const drape_scene_key *key, const param_text *text)
-{
-    for (size_t k = 0; k < object->form->key_count; k++) {
-        const drape_scene_key *other = &object->form->keys[k];
-        const param_text its = text_of_row(object, other);
-        if (is_same_row(&key->param, text, &other->param, &its))
-            return true;
-    }
-    return false;
-}
-
 /* One line for all objects that have the same key, at the first of them. */
 static void markdown_key(const cli_object *objects, int count, int first, const drape_scene_key *key)
 {
-    const char *places[CLI_MAX_OBJECTS];
+    const char *places[MAX_OBJECTS];
     int place_count = 0;
     const param_text text = text_of_row(&objects[first], key);
-    for (int i = 0; i < count; i++)
-        if (has_same_key(&objects[i], key, &text)) {
-            if (i < first)
-                return;
-            places[place_count++] = *objects[i].pointer ? objects[i].pointer : "/";
+    for (int i = 0; i < count; i++) {
+        const drape_scene_object *form = objects[i].form;
+        bool same = false;
+        for (size_t k = 0; k < form->key_count && !same; k++) {
+            const param_text its = text_of_row(&objects[i], &form->keys[k]);
+            same = is_same_row(&key->param, &text, &form->keys[k].param, &its);
         }
+        if (same && i < first)
+            return;
+        if (same)
+            places[place_count++] = *objects[i].pointer ? objects[i].pointer : "/";
+    }
     markdown_cells(places, place_count, key->param.name, key->param.help, &text);
-}
-
-static void markdown_object(const cli_object *object)
-{
-    (void)object;
 }
 
 static void markdown_table(const drape_registry *table)
@@ -330,11 +392,9 @@ static const list_style text_style = {.scene = text_scene,
                                       .object = text_object,
                                       .key = text_key,
                                       .table = text_table,
-                                      .entries_begin = nothing,
                                       .entry = text_entry,
                                       .param = text_param};
 static const list_style markdown_style = {.scene = markdown_scene,
-                                          .object = markdown_object,
                                           .key = markdown_key,
                                           .table = markdown_table,
                                           .entries_begin = markdown_entries_begin,
@@ -348,7 +408,8 @@ static void print_table(const list_style *style, const drape_registry *table, co
 {
     const drape_entry *entry;
     style->table(table);
-    style->entries_begin(table);
+    if (style->entries_begin)
+        style->entries_begin(table);
     for (int i = 0; (entry = table->entries[i]) != NULL; i++)
         if (is_shown(entry, only)) {
             style->entry(table, only, i);
@@ -362,8 +423,8 @@ static void print_table(const list_style *style, const drape_registry *table, co
 /* only: the name of one object; NULL: all. Returns how many were printed. */
 static int print_scene(const list_style *style, const char *only)
 {
-    cli_object objects[CLI_MAX_OBJECTS];
-    const int all = cli_objects(objects);
+    cli_object objects[MAX_OBJECTS];
+    const int all = add_objects(objects, 0, &drape_form_scene, "");
     int count = 0;
     for (int i = 0; i < all; i++)
         if (!only || strcmp(only, objects[i].form->name) == 0)
@@ -371,7 +432,8 @@ static int print_scene(const list_style *style, const char *only)
     if (count > 0)
         style->scene();
     for (int i = 0; i < count; i++) {
-        style->object(&objects[i]);
+        if (style->object)
+            style->object(&objects[i]);
         for (size_t k = 0; k < objects[i].form->key_count; k++)
             style->key(objects, count, i, &objects[i].form->keys[k]);
     }
@@ -382,21 +444,21 @@ static int unknown_name(const char *name)
 {
     const char *names[MAX_NAMES];
     size_t count = 0;
-    const drape_registry *const *tables = cli_tables();
-    cli_object objects[CLI_MAX_OBJECTS];
-    const int object_count = cli_objects(objects);
+    const drape_registry *const *all = list_tables();
+    cli_object objects[MAX_OBJECTS];
+    const int object_count = add_objects(objects, 0, &drape_form_scene, "");
     for (int i = 0; i < object_count; i++)
         names[count++] = objects[i].form->name;
-    for (int t = 0; tables[t] && count < MAX_NAMES; t++) {
-        names[count++] = tables[t]->key;
-        for (int i = 0; tables[t]->entries[i] && count < MAX_NAMES; i++)
-            names[count++] = tables[t]->entries[i]->name;
+    for (int t = 0; all[t] && count < MAX_NAMES; t++) {
+        names[count++] = all[t]->key;
+        for (int i = 0; all[t]->entries[i] && count < MAX_NAMES; i++)
+            names[count++] = all[t]->entries[i]->name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
     char known[512] = SCENE_NAME;
     size_t used = strlen(known);
-    for (int t = 0; tables[t] && used < sizeof known; t++)
-        used += (size_t)snprintf(known + used, sizeof known - used, ", %s", tables[t]->key);
+    for (int t = 0; all[t] && used < sizeof known; t++)
+        used += (size_t)snprintf(known + used, sizeof known - used, ", %s", all[t]->key);
     return cli_misuse("list", "there is no table or entry \"%.60s\"; the tables are %s%s%s%s", name, known,
                       DRAPE_DID_YOU_MEAN(meant));
 }
@@ -406,7 +468,7 @@ static int print_tables(const list_style *style, const char *name)
 {
     const bool keys = name && strcmp(name, SCENE_NAME) == 0;
     int printed = print_scene(style, keys ? NULL : name);
-    for (const drape_registry *const *t = cli_tables(); *t; t++) {
+    for (const drape_registry *const *t = list_tables(); *t; t++) {
         const drape_registry *table = *t;
         bool whole = !name || strcmp(name, table->key) == 0;
         if (!whole && drape_registry_find(table, NULL, name) < 0)

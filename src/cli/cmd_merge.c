@@ -11,8 +11,7 @@ typedef struct merge_request {
 } merge_request;
 
 static const cli_option options[] = {
-    {"out", CLI_TEXT, "DIR", "folder for the merged results and the report", offsetof(merge_request, out), 0,
-     NULL},
+    {"out", CLI_TEXT, "DIR", "folder for the merged results and the report", offsetof(merge_request, out)},
 };
 
 static int merge(const void *command)

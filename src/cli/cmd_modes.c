@@ -1,10 +1,8 @@
 /* cmd_modes.c: `drape modes`: eigenfrequencies or buckling loads about a state of a scene; a table, and
  * frames that show each mode. */
-#include "cli/cli.h"
 #include "cli/shapes.h"
-#include "cli/signals.h"
-#include "cli/state.h"
 
+#include "base/pi.h"
 #include "drape/lab.h"
 #include "io/csv.h"
 #include "io/json.h"
@@ -18,7 +16,6 @@
 #define TABLE          "modes.csv"
 #define DEFAULT_FRAMES 60   /* of each mode */
 #define DEFAULT_SIZE   0.05 /* of the scene, the largest displacement in a frame */
-#define PI             3.14159265358979323846
 
 typedef struct modes_request {
     cli_command command;
@@ -88,25 +85,22 @@ static int print_json(const job *j)
     return cli_print_json(&j->request->command, all, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
-static void print_vibration(int32_t number, const drape_mode *mode)
-{
-    printf("%4d  %-9s  %16.9g  %14.9g  %11.5g  %8.1e  %8.1e\n", (int)number, kinds[mode->kind], mode->value,
-           mode->frequency, mode->mass, mode->residual, mode->error);
-}
-
-static void print_load(int32_t number, const drape_mode *mode)
-{
-    printf("%4d  %16.9g  %8.1e  %8.1e\n", (int)number, mode->value, mode->residual, mode->error);
-}
-
 static void print_table(const job *j)
 {
     const bool buckling = j->request->buckling;
     fputs(buckling ? "mode       load factor  residual     error\n"
                    : "mode  kind         omega^2 [1/s2]  frequency [Hz]    mass [kg]  residual     error\n",
           stdout);
-    for (int32_t k = 0; k < j->modes.count; k++)
-        (buckling ? print_load : print_vibration)(k + 1, &j->modes.modes[k]);
+    for (int32_t k = 0; k < j->modes.count; k++) {
+        const drape_mode *mode = &j->modes.modes[k];
+        printf("%4d  ", (int)k + 1);
+        if (!buckling)
+            printf("%-9s  ", kinds[mode->kind]);
+        printf("%16.9g  ", mode->value);
+        if (!buckling)
+            printf("%14.9g  %11.5g  ", mode->frequency, mode->mass);
+        printf("%8.1e  %8.1e\n", mode->residual, mode->error);
+    }
     printf("force on a free node up to %.3g N; %lld eigenvalues counted up to the gap behind these modes\n",
            j->modes.force, (long long)j->modes.below);
 }
@@ -114,17 +108,6 @@ static void print_table(const job *j)
 /* ---- Frames ---- */
 
 /* Frame i of n in one period of a mode: x + a sin(2 pi i/n) u. */
-static drape_status emit_frame(const job *j, const double *start, const drape_mode *mode, double share,
-                               int64_t frame, double *x, const double *still)
-{
-    drape_sim *sim = j->in.sim;
-    const size_t n = 3 * (size_t)drape_model_node_count(j->in.model);
-    for (size_t i = 0; i < n; i++)
-        x[i] = start[i] + share * mode->shape[i];
-    drape_status status = drape_sim_set_state(sim, drape_sim_time(sim), x, still);
-    return status ? status : cli_shapes_emit(sim, frame);
-}
-
 static drape_status emit_frames(const job *j)
 {
     const int frames = frames_of(j->request);
@@ -132,17 +115,24 @@ static drape_status emit_frames(const job *j)
     const double size =
         j->request->amplitude > 0 ? j->request->amplitude : DEFAULT_SIZE * j->in.model->length;
     double *start = drape_arena_take(j->request->command.arena, 3 * n, sizeof *start);
-    drape_status status = start ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status)
-        memcpy(start, drape_sim_positions(j->in.sim), n * sizeof *start);
-    for (int32_t k = 0; k < j->modes.count; k++)
-        for (int i = 0; !status && i < frames; i++) {
-            const double share = size * sin(2 * PI * i / frames);
-            status = cli_interrupted() ? DRAPE_E_STOPPED
-                                       : emit_frame(j, start, &j->modes.modes[k], share,
-                                                    (int64_t)k * frames + i, start + n, start + 2 * n);
-        }
-    return status;
+    if (!start)
+        return DRAPE_E_MEMORY;
+    double *x = start + n, *still = x + n;
+    memcpy(start, drape_sim_positions(j->in.sim), n * sizeof *start);
+    for (int64_t frame = 0; frame < (int64_t)j->modes.count * frames; frame++) {
+        const double *shape = j->modes.modes[frame / frames].shape;
+        const double share = size * sin(2 * DRAPE_PI * (double)(frame % frames) / frames);
+        if (cli_interrupted())
+            return DRAPE_E_STOPPED;
+        for (size_t i = 0; i < n; i++)
+            x[i] = start[i] + share * shape[i];
+        drape_status status = drape_sim_set_state(j->in.sim, drape_sim_time(j->in.sim), x, still);
+        if (!status)
+            status = cli_shapes_emit(j->in.sim, frame);
+        if (status)
+            return status;
+    }
+    return DRAPE_OK;
 }
 
 static drape_status write_output(const job *j)
@@ -164,13 +154,6 @@ static drape_status write_output(const job *j)
 
 /* ---- The verb ---- */
 
-static int code_of(const cli_command *command, drape_status status)
-{
-    if (cli_interrupted())
-        return cli_report_interrupted(command->verb);
-    return cli_report(command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
-}
-
 static int compute(job *j, const cli_state *state)
 {
     const modes_request *request = j->request;
@@ -184,8 +167,10 @@ static int compute(job *j, const cli_state *state)
         status = drape_sim_modes(j->in.sim, &def, &j->modes);
     if (!status && request->out)
         status = write_output(j);
+    if (status && cli_interrupted())
+        return cli_report_interrupted(request->command.verb);
     if (status)
-        return code_of(&request->command, status);
+        return cli_report(&request->command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
     if (request->json)
         return print_json(j);
     print_table(j);
@@ -210,18 +195,18 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"count", CLI_NUMBER, "N", "number of modes (default 6)", offsetof(modes_request, count), 100000, NULL},
-    {"state", CLI_TEXT, "STATE", CLI_STATES " (default static)", offsetof(modes_request, state), 0, NULL},
+    {"count", CLI_NUMBER, "N", "number of modes (default 6)", offsetof(modes_request, count), 100000},
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default static)", offsetof(modes_request, state)},
     {"buckling", CLI_FLAG, NULL, "factors of the scene's loads at which the cloth buckles",
-     offsetof(modes_request, buckling), 0, NULL},
+     offsetof(modes_request, buckling)},
     {"out", CLI_TEXT, "DIR",
      "folder for modes.csv, scene.json and frames of each mode; drape render draws it",
-     offsetof(modes_request, out), 0, NULL},
+     offsetof(modes_request, out)},
     {"frames", CLI_NUMBER, "N", "frames of each mode, over one period (default 60)",
-     offsetof(modes_request, frames), 100000, NULL},
+     offsetof(modes_request, frames), 100000},
     {"amplitude", CLI_REAL, "METRES", "largest displacement in a frame (default: a twentieth of the scene)",
-     offsetof(modes_request, amplitude), 0, NULL},
-    {"json", CLI_FLAG, NULL, "print JSON", offsetof(modes_request, json), 0, NULL},
+     offsetof(modes_request, amplitude)},
+    {"json", CLI_FLAG, NULL, "print JSON", offsetof(modes_request, json)},
 };
 
 const drape_verb drape_verb_modes = {

@@ -1,7 +1,5 @@
 /* cmd_path.c: `drape path`: the equilibria of a scene as its loads grow; a table, and a frame of each. */
 #include "cli/shapes.h"
-#include "cli/signals.h"
-#include "cli/state.h"
 
 #include "drape/lab.h"
 #include "io/csv.h"
@@ -84,15 +82,6 @@ static drape_status open_table(job *j)
     return drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, &j->table);
 }
 
-static void print_point(const job *j, const drape_path_point *point)
-{
-    if (point->number == 0)
-        puts("point          factor  displacement     energy [J]  unstable  iterations  event");
-    printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
-           largest_displacement(j->in.model, drape_sim_positions(j->in.sim)),
-           point->elastic + point->potential, point->unstable, point->iterations, events[point->event]);
-}
-
 static drape_status observe(void *user, drape_sim *sim, const drape_path_point *point)
 {
     job *j = user;
@@ -101,7 +90,11 @@ static drape_status observe(void *user, drape_sim *sim, const drape_path_point *
         status = write_row(j, point);
     if (!status && j->recorder)
         status = cli_shapes_emit(sim, point->number);
-    print_point(j, point);
+    if (point->number == 0)
+        puts("point          factor  displacement     energy [J]  unstable  iterations  event");
+    printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
+           largest_displacement(j->in.model, drape_sim_positions(sim)), point->elastic + point->potential,
+           point->unstable, point->iterations, events[point->event]);
     return status;
 }
 
@@ -206,26 +199,26 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"state", CLI_TEXT, "STATE", CLI_STATES " (default start)", offsetof(path_request, state), 0, NULL},
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default start)", offsetof(path_request, state)},
     {"from", CLI_TEXT, "FACTOR", "factor of the loads at the first point (default 0 from the start, else 1)",
-     offsetof(path_request, from), 0, NULL},
+     offsetof(path_request, from)},
     {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1 from the start, else 2)",
-     offsetof(path_request, to), 0, NULL},
+     offsetof(path_request, to)},
     {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)",
-     offsetof(path_request, step), 0, NULL},
+     offsetof(path_request, step)},
     {"max-arc", CLI_REAL, "METRES",
      "longest step along the path, RMS of the nodes (default: a fiftieth of the scene)",
-     offsetof(path_request, max_arc), 0, NULL},
+     offsetof(path_request, max_arc)},
     {"points", CLI_NUMBER, "N", "points after which the path ends (default 200)",
-     offsetof(path_request, points), 1000000, NULL},
+     offsetof(path_request, points), 1000000},
     {"load-control", CLI_FLAG, NULL, "steps of the factor, not of the arc: no limit point is passed",
-     offsetof(path_request, load_control), 0, NULL},
+     offsetof(path_request, load_control)},
     {"branch", CLI_TEXT, "+|-", "at the first bifurcation, follow the branch to this side",
-     offsetof(path_request, branch), 0, NULL},
+     offsetof(path_request, branch)},
     {"node", CLI_TEXTS, "N", "columns with the displacement of this node; may be repeated",
-     offsetof(path_request, nodes), 0, NULL},
+     offsetof(path_request, nodes)},
     {"out", CLI_TEXT, "DIR", "folder for path.csv, scene.json and a frame of each point",
-     offsetof(path_request, out), 0, NULL},
+     offsetof(path_request, out)},
 };
 
 const drape_verb drape_verb_path = {

@@ -1,6 +1,5 @@
 /* cmd_render.c: `drape render`: draws pictures and films of scenes and finished runs. */
 #include "cli/frames.h"
-#include "cli/signals.h"
 
 #include "io/export.h"
 #include "io/scene_copy.h"
@@ -71,17 +70,14 @@ static bool read_numbers(const char *text, double *values, int min, int max)
     return false;
 }
 
-static int read_shade(render *r)
-{
-    int index;
-    const int code = cli_find_shading(&r->request->command, r->request->shade, &index);
-    r->shading = code == CLI_GO_ON ? drape_shadings[index] : NULL;
-    return code;
-}
-
-static int read_size(render *r)
+static int read_shade_and_size(render *r)
 {
     char end;
+    int index;
+    const int code = cli_find_shading(&r->request->command, r->request->shade, &index);
+    if (code != CLI_GO_ON)
+        return code;
+    r->shading = drape_shadings[index];
     r->width = DEFAULT_WIDTH;
     r->height = DEFAULT_HEIGHT;
     if (r->request->size &&
@@ -147,14 +143,6 @@ static int read_images(render *r)
     return CLI_GO_ON;
 }
 
-/* ".png" of "a.b/x.png"; "" if the name has no dot after its beginning or ends in a slash. */
-static const char *ending_of(const char *path)
-{
-    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
-    const char *dot = strrchr(name + strspn(name, "."), '.');
-    return dot ? dot : "";
-}
-
 /* ".mp4, .webm" ... */
 static const char *film_endings(char *text, size_t size)
 {
@@ -172,7 +160,9 @@ static int read_kind(render *r)
     if (!out)
         return cli_misuse("render", "--out is missing: a picture (.png), a film (%s) or a folder",
                           film_endings(films, sizeof films));
-    const char *ending = ending_of(out);
+    /* ".png" of "a.b/x.png"; "" if the name has no dot after its beginning or ends in a slash */
+    const char *slash = strrchr(out, '/'), *name = slash ? slash + 1 : out;
+    const char *dot = strrchr(name + strspn(name, "."), '.'), *ending = dot ? dot : "";
     r->film = drape_film_knows(out);
     r->picture = strcasecmp(ending, ".png") == 0;
     if (r->film || r->picture || !*ending || cli_is_folder(out))
@@ -215,8 +205,8 @@ static int read_out(render *r)
 
 static int read_request(render *r)
 {
-    int (*const readers[])(render *) = {read_shade,  read_size, read_camera, read_range,
-                                        read_images, read_kind, read_out};
+    int (*const readers[])(render *) = {read_shade_and_size, read_camera, read_range,
+                                        read_images,         read_kind,   read_out};
     int code = CLI_GO_ON;
     for (size_t i = 0; i < sizeof readers / sizeof *readers && code == CLI_GO_ON; i++)
         code = readers[i](r);
@@ -275,30 +265,14 @@ static void add_frames(render *r, drape_framing *framing, const float *offset)
     }
 }
 
-/* A camera about the middle of the first stage, as far as the angle that needs most. */
-static drape_camera turning_camera(render *r, float aspect)
-{
-    drape_camera camera = {.azimuth = (float)r->azimuth, .elevation = (float)r->elevation};
-    float offset[3];
-    for (int k = 0; k < 3; k++) {
-        camera.target[k] = r->stages[0].center[k];
-        offset[k] = -camera.target[k];
-    }
-    for (int i = 0; i < TURN_ANGLES; i++) {
-        drape_framing framing = drape_framing_begin((float)r->azimuth + 360.0f * (float)i / TURN_ANGLES,
-                                                    (float)r->elevation, aspect);
-        add_frames(r, &framing, offset);
-        camera.distance = fmaxf(camera.distance, drape_framing_distance(&framing) / (float)r->zoom);
-    }
-    return camera;
-}
-
-/* One camera for all panels and all frames. */
+/* One camera for all panels and all frames. That of a turntable is about the middle of the first stage, as
+ * far as the angle that needs most. */
 static int set_stages(render *r)
 {
     const drape_picture picture = {.panel_count = r->source_count, .shading = r->shading};
-    float aspect = drape_painter_aspect(r->painter, &picture);
-    drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
+    const float aspect = drape_painter_aspect(r->painter, &picture), azimuth = (float)r->azimuth,
+                elevation = (float)r->elevation;
+    float offset[3] = {0};
     r->stages = drape_arena_take(r->request->command.arena, (size_t)r->source_count, sizeof *r->stages);
     if (!r->stages)
         return cli_report(&r->request->command, CLI_FAILED);
@@ -311,27 +285,24 @@ static int set_stages(render *r)
             drape_stage_add(stage, drape_reel_positions(reel, k));
         drape_stage_finish(stage);
     }
-    if (r->request->turntable) {
-        r->view = turning_camera(r, aspect);
+    if (!r->request->turntable) {
+        drape_framing framing = drape_framing_begin(azimuth, elevation, aspect);
+        add_frames(r, &framing, offset);
+        r->view = drape_framing_end(&framing, azimuth, elevation, (float)r->zoom);
         return CLI_GO_ON;
     }
-    add_frames(r, &framing, (const float[3]){0});
-    r->view = drape_framing_end(&framing, (float)r->azimuth, (float)r->elevation, (float)r->zoom);
-    return CLI_GO_ON;
-}
-
-/* The range of all values of all runs, extended to 0, unless a range was given. */
-static void set_range(render *r)
-{
-    double low = 0, high = 0;
-    if (!r->shading->field || !isnan(r->low))
-        return;
-    for (int i = 0; i < r->source_count; i++) {
-        low = fmin(low, r->sources[i].reel.low);
-        high = fmax(high, r->sources[i].reel.high);
+    r->view = (drape_camera){.azimuth = azimuth, .elevation = elevation};
+    for (int k = 0; k < 3; k++) {
+        r->view.target[k] = r->stages[0].center[k];
+        offset[k] = -r->view.target[k];
     }
-    r->low = low;
-    r->high = high - low > MIN_RANGE ? high : low + MIN_RANGE;
+    for (int i = 0; i < TURN_ANGLES; i++) {
+        drape_framing framing =
+            drape_framing_begin(azimuth + 360.0f * (float)i / TURN_ANGLES, elevation, aspect);
+        add_frames(r, &framing, offset);
+        r->view.distance = fmaxf(r->view.distance, drape_framing_distance(&framing) / (float)r->zoom);
+    }
+    return CLI_GO_ON;
 }
 
 /* ---- Drawing ---- */
@@ -379,28 +350,22 @@ static void average(render *r)
         }
 }
 
-/* Writes frame k, which is in r->pixels. */
-static drape_status write_frame(render *r, size_t k)
-{
-    char name[PICTURE_NAME];
-    if (r->making)
-        return drape_film_add(r->making, r->pixels);
-    snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
-    return drape_png_write(r->ctx, r->folder, r->folder ? name : r->request->out, r->pixels, r->width,
-                           r->height, r->request->small);
-}
-
 /* The driver draws the next frame while this one is written. */
 static drape_status draw_frames(render *r)
 {
     size_t count = r->sources[0].reel.count;
+    char name[PICTURE_NAME];
     drape_status status = draw(r, 0);
     for (size_t k = 0; k < count && !status && !cli_interrupted(); k++) {
         status = drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->drawn);
         average(r);
         drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
-        if (!status)
-            status = write_frame(r, k);
+        snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
+        if (!status && r->making)
+            status = drape_film_add(r->making, r->pixels);
+        else if (!status)
+            status = drape_png_write(r->ctx, r->folder, r->folder ? name : r->request->out, r->pixels,
+                                     r->width, r->height, r->request->small);
         status = status ? status : next;
     }
     return status;
@@ -410,31 +375,6 @@ static bool is_picture(const void *user, const char *name)
 {
     (void)user;
     return drape_frame_is_name(name, PICTURE_DIGITS, "png");
-}
-
-/* Pictures of an earlier call are removed from a folder, so that those of two runs do not mix. */
-static drape_status begin_frames(render *r)
-{
-    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every /
-                  (r->request->slow ? r->request->slow : 1);
-    if (r->film)
-        return drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &r->making);
-    return r->folder ? drape_folder_begin(r->folder, is_picture, NULL) : DRAPE_OK;
-}
-
-static drape_status make_frames(render *r)
-{
-    char message[DRAPE_MESSAGE_SIZE];
-    drape_status status = begin_frames(r);
-    if (!status)
-        status = draw_frames(r);
-    if (!r->making)
-        return status;
-    if (!status && !cli_interrupted())
-        return drape_film_end(&r->making);
-    snprintf(message, sizeof message, "%s", drape_context_message(r->ctx));
-    drape_film_abandon(&r->making);
-    return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
 }
 
 /* ---- What must not be replaced ---- */
@@ -447,11 +387,13 @@ static drape_status check_input(void *user, const char *path, const char *pointe
                      : drape_file_check_named(r->ctx, r->request->out, path);
 }
 
-static drape_status check_inputs(render *r)
+/* Before anything is simulated: whether the output may be written where it should be. */
+static int open_output(render *r)
 {
     const render_request *q = r->request;
     const char *const images[] = {q->texture, q->height, q->environment};
-    drape_status status = DRAPE_OK;
+    const bool folder = !r->film && !r->picture;
+    drape_status status = folder ? drape_folder_open(r->ctx, r->request->out, false, &r->folder) : DRAPE_OK;
     for (size_t i = 0; i < sizeof images / sizeof *images && !status; i++)
         status = images[i] ? check_input(r, images[i], "") : DRAPE_OK;
     for (int i = 0; i < r->source_count && !status; i++) {
@@ -460,33 +402,56 @@ static drape_status check_inputs(render *r)
         if (!status)
             status = drape_scene_files(r->ctx, r->sources[i].in.model, path, check_input, r);
     }
-    return status;
-}
-
-/* Before anything is simulated: whether the output may be written where it should be. */
-static int open_output(render *r)
-{
-    const bool folder = !r->film && !r->picture;
-    drape_status status = folder ? drape_folder_open(r->ctx, r->request->out, false, &r->folder) : DRAPE_OK;
-    if (!status)
-        status = check_inputs(r);
     if (!status && folder)
         status = drape_folder_check(r->folder, is_picture, is_picture, NULL);
     return status ? cli_report(&r->request->command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED)
                   : CLI_GO_ON;
 }
 
+/* Begins the output, draws and ends it. Pictures of an earlier call are removed from a folder, so that those
+ * of two runs do not mix. */
+static drape_status make_frames(render *r)
+{
+    char message[DRAPE_MESSAGE_SIZE];
+    const double slow = r->request->slow ? r->request->slow : 1;
+    const double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every / slow;
+    drape_status status = DRAPE_OK;
+    if (r->film)
+        status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &r->making);
+    else if (r->folder)
+        status = drape_folder_begin(r->folder, is_picture, NULL);
+    if (!status)
+        status = draw_frames(r);
+    if (!r->making)
+        return status;
+    if (!status && !cli_interrupted())
+        return drape_film_end(&r->making);
+    snprintf(message, sizeof message, "%s", drape_context_message(r->ctx));
+    drape_film_abandon(&r->making);
+    return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
+}
+
+/* The range of a field is that of all values of all runs, extended to 0, unless one was given. */
 static int make(render *r)
 {
+    const size_t count = r->sources[0].reel.count;
+    double low = 0, high = 0;
     bool incomplete = false;
+    for (int i = 0; i < r->source_count; i++) {
+        low = fmin(low, r->sources[i].reel.low);
+        high = fmax(high, r->sources[i].reel.high);
+        incomplete |= r->sources[i].incomplete;
+    }
+    if (r->shading->field && isnan(r->low)) {
+        r->low = low;
+        r->high = high - low > MIN_RANGE ? high : low + MIN_RANGE;
+    }
     if (make_frames(r))
         return cli_report(&r->request->command, CLI_FAILED);
     if (cli_interrupted() && !r->picture) /* a picture is complete */
         return cli_report_interrupted("render");
-    for (int i = 0; i < r->source_count; i++)
-        incomplete |= r->sources[i].incomplete;
-    printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), r->sources[0].reel.count,
-           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->entry.name);
+    printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), count, count == 1 ? "" : "s",
+           r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }
 
@@ -501,10 +466,8 @@ static int run(const void *command)
         code = stages[i](&r);
     if (code == CLI_GO_ON && cli_interrupted())
         code = cli_report_interrupted("render");
-    if (code == CLI_GO_ON) {
-        set_range(&r);
+    if (code == CLI_GO_ON)
         code = make(&r);
-    }
     for (int i = 0; i < r.source_count; i++) {
         if (r.stages)
             drape_stage_free(&r.stages[i]);

@@ -3,7 +3,6 @@
 #include "cli/progress.h"
 #include "cli/ranks.h"
 #include "cli/realtime.h"
-#include "cli/signals.h"
 
 #include "base/clock.h"
 #include "base/hash.h"
@@ -82,37 +81,19 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-/* When a run is resumed, the recorder and the copy of the scene exist already; its old summary is removed, as
- * that of an earlier run is when a run starts, since a killed run must not leave it. */
-static drape_status begin_output(run *r)
-{
-    if (!r->request->out || drape_recorder_done(r->recorder).finished)
-        return DRAPE_OK;
-    if (r->recorder && !drape_recorder_done(r->recorder).writes)
-        return DRAPE_OK;
-    if (r->recorder)
-        return drape_folder_remove(drape_recorder_folder(r->recorder), drape_folder_is_named,
-                                   DRAPE_SUMMARY_NAME);
-    const char *path = r->request->command.operand;
-    const bool copies = !drape_scene_copy_is(path, r->request->out);
-    const drape_recorder_def def = recorder_def(r);
-    drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (status || !copies || !drape_recorder_done(r->recorder).writes)
-        return status;
-    return drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), path,
-                            drape_recorder_folder(r->recorder));
-}
-
 /* ---- Resuming ---- */
 
 /* Restores the sim and the recorder from the checkpoint in the folder. Without a checkpoint the run starts
- * anew. */
-static drape_status restore(run *r)
+ * anew. Nothing is written if this fails. */
+static int resume(run *r)
 {
+    const cli_command *command = &r->request->command;
     const drape_ranks *ranks = drape_model_ranks(r->in.model);
     drape_context *ctx = r->in.ctx;
     bool there;
     size_t size;
+    if (!r->request->resume)
+        return CLI_GO_ON;
     char *path = drape_record_path(ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
     drape_status status =
         path ? drape_file_read(ctx, path, INT64_MAX, &r->checkpoint, &size) : DRAPE_E_MEMORY;
@@ -132,16 +113,9 @@ static drape_status restore(run *r)
         status = drape_recorder_create(ctx, r->in.sim, &def, &r->recorder);
     r->start -= drape_recorder_done(r->recorder).wall;
     drape_free(ctx, path);
-    return status;
-}
-
-/* Nothing is written if this fails. */
-static int resume(run *r)
-{
-    drape_status status = r->request->resume ? restore(r) : DRAPE_OK;
     if (status == DRAPE_E_STOPPED)
-        return cli_report_interrupted(r->request->command.verb);
-    return status ? cli_report(&r->request->command, CLI_BAD_INPUT) : CLI_GO_ON;
+        return cli_report_interrupted(command->verb);
+    return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static drape_status check_input(void *user, const char *path, const char *pointer)
@@ -161,19 +135,26 @@ static int check_summary_folder(const run_request *request)
                       request->summary);
 }
 
-/* --summary must not replace the scene, a mesh, or a file in the folder of the run. */
-static int check_summary(run *r)
+/* The folder of a run gets a copy of the scene as it was run. If the scene itself is that file, options that
+ * change the scene would overwrite the user's file. --summary must not replace the scene, a mesh, or a file
+ * in the folder of the run. */
+static int check_outputs(run *r)
 {
     const run_request *request = r->request;
+    const cli_command *command = &request->command;
+    if (request->out && command->setting_count > 0 && drape_scene_copy_is(command->operand, request->out))
+        return cli_misuse(command->verb,
+                          "--out \"%.500s\": its " DRAPE_SCENE_COPY
+                          " is the scene itself, and would be overwritten by the "
+                          "changed scene; choose another folder",
+                          request->out);
     if (!request->summary)
         return CLI_GO_ON;
-    drape_status status = check_input(r, request->command.operand, "");
+    drape_status status = check_input(r, command->operand, "");
     if (!status)
-        status = drape_scene_files(r->in.ctx, drape_model_whole(r->in.model), request->command.operand,
-                                   check_input, r);
-    if (status)
-        return cli_report(&r->request->command, CLI_BAD_INPUT);
-    return check_summary_folder(request);
+        status =
+            drape_scene_files(r->in.ctx, drape_model_whole(r->in.model), command->operand, check_input, r);
+    return status ? cli_report(command, CLI_BAD_INPUT) : check_summary_folder(request);
 }
 
 static void write_summary(run *r, drape_folder *folder, const char *path)
@@ -187,57 +168,39 @@ static void write_summary(run *r, drape_folder *folder, const char *path)
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
 }
 
-/* A folder that would lose a file of somebody else's is refused as bad input, before anything is touched. A
- * folder that cannot be written is the failure of the run. */
+/* When a run is resumed, the recorder and the copy of the scene exist already; its old summary is removed, as
+ * that of an earlier run is when a run starts, since a killed run must not leave it. A folder that would lose
+ * a file of somebody else's is refused as bad input, before anything is touched. A folder that cannot be
+ * written is the failure of the run. */
 static int open_output(run *r)
 {
-    drape_status status = begin_output(r);
+    const cli_command *command = &r->request->command;
+    const bool resumed = r->recorder != NULL;
+    drape_status status = DRAPE_OK;
+    if (!r->request->out || drape_recorder_done(r->recorder).finished)
+        return CLI_GO_ON;
+    const bool copies = !resumed && !drape_scene_copy_is(command->operand, r->request->out);
+    const drape_recorder_def def = recorder_def(r);
+    if (!resumed)
+        status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
+    if (!status && !drape_recorder_done(r->recorder).writes)
+        return CLI_GO_ON;
+    drape_folder *folder = status ? NULL : drape_recorder_folder(r->recorder);
+    if (resumed)
+        status = drape_folder_remove(folder, drape_folder_is_named, DRAPE_SUMMARY_NAME);
+    else if (!status && copies)
+        status = drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), command->operand,
+                                  folder);
     if (!status)
         return CLI_GO_ON;
     note(r, status);
     if (status != DRAPE_E_ARGUMENT && r->request->summary)
         write_summary(r, NULL, r->request->summary);
-    cli_print_message(&r->request->command, r->message);
+    cli_print_message(command, r->message);
     return status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED;
 }
 
 /* ---- Results on stdout ---- */
-
-static void print_steps(const run *r, const drape_statistics *s)
-{
-    int64_t count = 0;
-    const char *reason;
-    printf("steps     %lld accepted, %lld rejected", (long long)s->steps_accepted,
-           (long long)s->steps_rejected);
-    for (int i = 0; (reason = drape_sim_reason(r->in.sim, i, &count)); i++)
-        printf("%s%s %lld", i ? ", " : " (", reason, (long long)count);
-    fputs(s->steps_rejected > 0 ? ")" : "", stdout);
-    if (s->steps_unconverged > 0)
-        printf("; %lld accepted although unconverged", (long long)s->steps_unconverged);
-    if (s->steps_accepted > 0)
-        printf("; %.4g to %.4g s", s->h_min, s->h_max);
-    fputc('\n', stdout);
-}
-
-static void print_newton(const drape_statistics *s, const drape_left *left)
-{
-    int64_t attempts = s->steps_accepted + s->steps_rejected;
-    printf(
-        "newton    %lld iterations, %.3g an attempt; %lld residuals, %lld Jacobians, %lld factorizations\n",
-        (long long)s->newton_iterations, attempts ? (double)s->newton_iterations / (double)attempts : 0.0,
-        (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
-    if (!isnan(s->tolerance))
-        printf("tolerance %.4g N on the residual of a node\n", s->tolerance);
-    if (left->by_error > 0)
-        printf("solved    %lld steps to their local error; last corrections of %.3g m and %.3g J at most\n",
-               (long long)left->by_error, s->error_max, left->largest);
-    if (s->steps_accepted > 0 && !isnan(s->error_bound))
-        printf(
-            "error     %.3g m at most, %.3g m in the last step, by estimate; %lld steps above the bound of "
-            "%.3g m, %lld above their local error; errors of steps may add up\n",
-            s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound,
-            (long long)left->above_own);
-}
 
 static void print_energy(const run *r)
 {
@@ -271,25 +234,6 @@ static void print_events(const run *r)
             printf("%lld times, first at %.12g s, last %s at %.12g s\n", (long long)event.count, event.first,
                    event.direction > 0 ? "up" : "down", event.last);
     }
-}
-
-static void print_wall(const run *r, const drape_statistics *s)
-{
-    const struct {
-        const char *name;
-        double seconds;
-    } parts[] = {{"residual", s->wall_residual},
-                 {"Jacobian", s->wall_jacobian},
-                 {"factor", s->wall_factor},
-                 {"solve", s->wall_solve},
-                 {"contact", s->wall_contact}};
-    double steps = s->wall_steps > 0 ? s->wall_steps : 1;
-    printf("wall      %.4g s; %.4g ms a step", r->wall,
-           s->steps_accepted ? 1e3 * s->wall_steps / (double)s->steps_accepted : 0.0);
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (parts[i].seconds > 0)
-            printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
-    fputc('\n', stdout);
 }
 
 /* Printed only if the scene asks for it. */
@@ -328,16 +272,55 @@ static void print_inside(run *r)
                edges == 1 ? "" : "s");
 }
 
+static void print_solver(const run *r, const drape_statistics *s)
+{
+    const drape_left *left = &r->in.sim->left;
+    const int64_t attempts = s->steps_accepted + s->steps_rejected;
+    int64_t count = 0;
+    const char *reason;
+    printf("steps     %lld accepted, %lld rejected", (long long)s->steps_accepted,
+           (long long)s->steps_rejected);
+    for (int i = 0; (reason = drape_sim_reason(r->in.sim, i, &count)); i++)
+        printf("%s%s %lld", i ? ", " : " (", reason, (long long)count);
+    fputs(s->steps_rejected > 0 ? ")" : "", stdout);
+    if (s->steps_unconverged > 0)
+        printf("; %lld accepted although unconverged", (long long)s->steps_unconverged);
+    if (s->steps_accepted > 0)
+        printf("; %.4g to %.4g s", s->h_min, s->h_max);
+    printf("\nnewton    %lld iterations, %.3g an attempt; %lld residuals, %lld Jacobians, %lld "
+           "factorizations\n",
+           (long long)s->newton_iterations, attempts ? (double)s->newton_iterations / (double)attempts : 0.0,
+           (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
+    if (!isnan(s->tolerance))
+        printf("tolerance %.4g N on the residual of a node\n", s->tolerance);
+    if (left->by_error > 0)
+        printf("solved    %lld steps to their local error; last corrections of %.3g m and %.3g J at most\n",
+               (long long)left->by_error, s->error_max, left->largest);
+    if (s->steps_accepted > 0 && !isnan(s->error_bound))
+        printf(
+            "error     %.3g m at most, %.3g m in the last step, by estimate; %lld steps above the bound of "
+            "%.3g m, %lld above their local error; errors of steps may add up\n",
+            s->error_max, s->error_last, (long long)s->steps_above_error, s->error_bound,
+            (long long)left->above_own);
+}
+
 static void print_results(run *r)
 {
     const drape_model *model = r->in.model;
     const drape_statistics s = drape_sim_statistics(r->in.sim);
+    const struct {
+        const char *name;
+        double seconds;
+    } parts[] = {{"residual", s.wall_residual},
+                 {"Jacobian", s.wall_jacobian},
+                 {"factor", s.wall_factor},
+                 {"solve", s.wall_solve},
+                 {"contact", s.wall_contact}};
     printf("status    %s\n", drape_status_name(r->status));
     printf("model     %d nodes, %lld degrees of freedom, %lld nonzeros\n", (int)drape_model_node_count(model),
            (long long)drape_model_dof_count(model), (long long)drape_model_nonzero_count(model));
     printf("time      %.9g of %.9g s\n", drape_sim_time(r->in.sim), drape_model_duration(model));
-    print_steps(r, &s);
-    print_newton(&s, &r->in.sim->left);
+    print_solver(r, &s);
     printf("strain    %.5g to %.5g\n", s.strain_min, s.strain_max);
     if (s.stability_known)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
@@ -347,7 +330,13 @@ static void print_results(run *r)
     print_untangling(r);
     if (!model->part)
         print_inside(r);
-    print_wall(r, &s);
+    printf("wall      %.4g s; %.4g ms a step", r->wall,
+           s.steps_accepted ? 1e3 * s.wall_steps / (double)s.steps_accepted : 0.0);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        if (parts[i].seconds > 0)
+            printf("%s %s %.0f %%", i ? "," : ":", parts[i].name,
+                   100 * parts[i].seconds / (s.wall_steps > 0 ? s.wall_steps : 1));
+    fputc('\n', stdout);
     if (r->request->realtime)
         cli_realtime_print(&r->realtime);
     if (r->recorder)
@@ -403,88 +392,43 @@ static void advance(run *r)
 }
 
 /* An interrupted run writes its checkpoint before its last frame, as a resumed run will not have that frame;
- * a completed run writes it afterwards. */
-static void finish(run *r)
-{
-    const bool keeps = r->recorder && keeps_checkpoints(r);
-    if (keeps && r->status == DRAPE_E_STOPPED)
-        note(r, drape_recorder_checkpoint(r->recorder));
-    if (r->recorder)
-        note(r, drape_recorder_finish(r->recorder));
-    if (keeps && !r->status)
-        note(r, drape_recorder_checkpoint(r->recorder));
-    r->wall = keeps && !r->status ? drape_recorder_done(r->recorder).wall : drape_clock_seconds() - r->start;
-}
-
-/* A run that an event stopped has completed, and the summary says why. */
-static void note_event(run *r)
-{
-    drape_event_record event;
-    const int32_t by = drape_sim_stopped_by(r->in.sim);
-    if (r->status || by < 0)
-        return;
-    drape_sim_event(r->in.sim, by, &event);
-    snprintf(r->message, sizeof r->message, "t=%.9g: stopped by event \"%.60s\"", drape_sim_time(r->in.sim),
-             event.name);
-}
-
-static void simulate(run *r)
+ * a completed run writes it afterwards. A run that an event stopped has completed, and the summary says why.
+ * A signal after the last step does not interrupt the run, unless it cut the counts short. */
+static int simulate(run *r)
 {
     const bool done = drape_recorder_done(r->recorder).finished;
+    const bool keeps = !done && r->recorder && keeps_checkpoints(r);
+    drape_event_record event;
     print_warnings(r);
     if (!done)
         advance(r);
-    if (done)
-        r->wall = drape_recorder_done(r->recorder).wall;
-    else
-        finish(r);
-    note_event(r);
+    if (keeps && r->status == DRAPE_E_STOPPED)
+        note(r, drape_recorder_checkpoint(r->recorder));
+    if (!done && r->recorder)
+        note(r, drape_recorder_finish(r->recorder));
+    if (keeps && !r->status)
+        note(r, drape_recorder_checkpoint(r->recorder));
+    r->wall = done || (keeps && !r->status) ? drape_recorder_done(r->recorder).wall
+                                            : drape_clock_seconds() - r->start;
+    const int32_t by = drape_sim_stopped_by(r->in.sim);
+    if (!r->status && by >= 0) {
+        drape_sim_event(r->in.sim, by, &event);
+        snprintf(r->message, sizeof r->message, "t=%.9g: stopped by event \"%.60s\"",
+                 drape_sim_time(r->in.sim), event.name);
+    }
     if (r->recorder)
         write_summary(r, drape_recorder_folder(r->recorder), DRAPE_SUMMARY_NAME);
     if (r->request->summary)
         write_summary(r, NULL, r->request->summary);
-}
-
-/* A signal after the last step does not interrupt the run, unless it cut the counts short. */
-static int conclude(run *r)
-{
     print_results(r);
     fflush(stdout);
-    if (!r->status) /* a failure has its own line */
+    if (!r->status) { /* a failure has its own line */
         print_warnings(r);
-    if (!r->status)
         return r->uncounted && cli_interrupted() ? cli_report_interrupted(r->request->command.verb)
                                                  : CLI_DONE;
+    }
     cli_print_message(&r->request->command, r->message);
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
-}
-
-/* The folder of a run gets a copy of the scene as it was run. If the scene itself is that file, options that
- * change the scene would overwrite the user's file. */
-static int check_folder(const run_request *request)
-{
-    const cli_command *command = &request->command;
-    if (!request->out || command->setting_count == 0 || !drape_scene_copy_is(command->operand, request->out))
-        return CLI_GO_ON;
-    return cli_misuse(command->verb,
-                      "--out \"%.500s\": its " DRAPE_SCENE_COPY
-                      " is the scene itself, and would be overwritten by the "
-                      "changed scene; choose another folder",
-                      request->out);
-}
-
-static int check_checkpoints(const run_request *request)
-{
-    const char *verb = request->command.verb;
-    if (!request->resume && request->checkpoint_every == 0)
-        return CLI_GO_ON;
-    const char *option = request->resume ? "resume" : "checkpoint-every";
-    if (!request->out)
-        return cli_misuse(verb, "--%s needs --out: the checkpoint is in the folder of the run", option);
-    if (request->realtime)
-        return cli_misuse(verb, "--%s cannot be combined with --realtime, whose steps depend on the clock",
-                          option);
-    return CLI_GO_ON;
 }
 
 static uint64_t hash_text(uint64_t hash, const char *text)
@@ -526,9 +470,14 @@ static int check_integrator(const run *r)
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
+    const char *verb = request->command.verb, *option = request->resume ? "resume" : "checkpoint-every";
+    const bool keeps = keeps_checkpoints(&r);
     int code = check_ranks(request);
-    if (code == CLI_GO_ON)
-        code = check_checkpoints(request);
+    if (code == CLI_GO_ON && keeps && !request->out)
+        code = cli_misuse(verb, "--%s needs --out: the checkpoint is in the folder of the run", option);
+    if (code == CLI_GO_ON && keeps && request->realtime)
+        code = cli_misuse(verb, "--%s cannot be combined with --realtime, whose steps depend on the clock",
+                          option);
     if (code != CLI_GO_ON)
         return code;
     code = cli_scene_load_with(&request->command, request->command.operand,
@@ -536,9 +485,7 @@ static int load_and_run(const run_request *request)
     if (code == CLI_GO_ON)
         code = check_integrator(&r);
     if (code == CLI_GO_ON)
-        code = check_folder(request);
-    if (code == CLI_GO_ON)
-        code = check_summary(&r);
+        code = check_outputs(&r);
     code = cli_ranks_agree(&request->command, code);
     if (code == CLI_GO_ON)
         code = cli_ranks_agree(&request->command, resume(&r));
@@ -546,10 +493,8 @@ static int load_and_run(const run_request *request)
         code = cli_ranks_agree(&request->command, open_output(&r));
     if (code == CLI_GO_ON)
         code = check_summary_folder(request);
-    if (code == CLI_GO_ON) {
-        simulate(&r);
-        code = conclude(&r);
-    }
+    if (code == CLI_GO_ON)
+        code = simulate(&r);
     drape_recorder_destroy(&r.recorder);
     drape_free(r.in.ctx, r.checkpoint);
     cli_scene_free(&r.in);

@@ -1,7 +1,6 @@
 /* cmd_validate.c: `drape validate`: measured against expected values, as a table, as Markdown, as JSON. */
 #include "cli/cli.h"
 #include "cli/progress.h"
-#include "cli/signals.h"
 #include "lab/validate.h"
 
 #include "base/clock.h"
@@ -98,26 +97,6 @@ static const validate_style
 
 /* ---- Running ---- */
 
-static drape_status write_scene(drape_context *ctx, drape_folder *folder, const drape_reference *reference,
-                                int index)
-{
-    char name[128], text[DRAPE_LAB_TEXT];
-    const double p = reference->parameters[index];
-    const drape_reference_case one = {reference, p,
-                                      reference->high > 0 ? drape_reference_expected(reference, p) : 0};
-    drape_file file = {0};
-    drape_reference_text(&one, text);
-    snprintf(name, sizeof name, SCENE_NAME, reference->entry.name, index);
-    drape_status status = drape_export_begin(ctx, folder, name, &file);
-    if (!status) {
-        drape_file_put_text(&file, text);
-        drape_file_put_text(&file, "\n");
-        status = drape_file_finish(&file);
-    }
-    drape_file_destroy(&file);
-    return status;
-}
-
 /* Whether a file has the name of a scene of the references to be written: `user`, or all of them if NULL. */
 static bool is_scene(const void *user, const char *name)
 {
@@ -142,23 +121,26 @@ static int write_scenes(const validate_request *request, const drape_reference *
         status = drape_folder_begin(folder, NULL, NULL);
     for (int r = 0; drape_references[r]; r++)
         for (int i = 0;
-             !status && (!only || only == drape_references[r]) && i < drape_references[r]->case_count; i++)
-            status = write_scene(ctx, folder, drape_references[r], i);
+             !status && (!only || only == drape_references[r]) && i < drape_references[r]->case_count; i++) {
+            const drape_reference *reference = drape_references[r];
+            const double p = reference->parameters[i];
+            const drape_reference_case one = {
+                reference, p, reference->high > 0 ? drape_reference_expected(reference, p) : 0};
+            char name[128], text[DRAPE_LAB_TEXT];
+            drape_file file = {0};
+            drape_reference_text(&one, text);
+            snprintf(name, sizeof name, SCENE_NAME, reference->entry.name, i);
+            status = drape_export_begin(ctx, folder, name, &file);
+            if (!status) {
+                drape_file_put_text(&file, text);
+                drape_file_put_text(&file, "\n");
+                status = drape_file_finish(&file);
+            }
+            drape_file_destroy(&file);
+        }
     drape_folder_close(&folder);
     return !status ? CLI_DONE
                    : cli_report(&request->command, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
-}
-
-static int find(const char *name, const drape_reference **only)
-{
-    const int i = drape_registry_find(&drape_reference_registry, NULL, name);
-    if (i < 0) {
-        char text[DRAPE_UNKNOWN_SIZE];
-        drape_registry_unknown(&drape_reference_registry, NULL, name, text);
-        return cli_misuse("validate", "%s", text);
-    }
-    *only = drape_references[i];
-    return CLI_GO_ON;
 }
 
 /* The cases of a run, and how far it is. */
@@ -258,35 +240,32 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     return code;
 }
 
-static int validate(const validate_request *request, drape_context *ctx)
-{
-    const drape_reference *only = NULL;
-    int code = CLI_GO_ON;
-    if (request->json && request->markdown)
-        return cli_misuse("validate", "--json and --markdown exclude each other");
-    if (request->command.operand)
-        code = find(request->command.operand, &only);
-    if (code != CLI_GO_ON)
-        return code;
-    if (!request->scenes)
-        return run_references(ctx, request, only);
-    return write_scenes(request, only);
-}
-
 static const cli_option options[] = {
-    {"json", CLI_FLAG, NULL, "print one array, an object for each case", offsetof(validate_request, json), 0,
-     NULL},
-    {"markdown", CLI_FLAG, NULL, "print a Markdown table", offsetof(validate_request, markdown), 0, NULL},
+    {"json", CLI_FLAG, NULL, "print one array, an object for each case", offsetof(validate_request, json)},
+    {"markdown", CLI_FLAG, NULL, "print a Markdown table", offsetof(validate_request, markdown)},
     {"out", CLI_TEXT, "DIR", "save a line of JSON for each case; the same command resumes where it stopped",
-     offsetof(validate_request, out), 0, NULL},
+     offsetof(validate_request, out)},
     {"scenes", CLI_TEXT, "DIR", "only write the scene of every case into DIR",
-     offsetof(validate_request, scenes), 0, NULL},
+     offsetof(validate_request, scenes)},
 };
 
 static int main_validate(const void *command)
 {
     const validate_request *request = command;
-    return validate(request, request->command.ctx);
+    const drape_reference *only = NULL;
+    if (request->json && request->markdown)
+        return cli_misuse("validate", "--json and --markdown exclude each other");
+    if (request->command.operand) {
+        char text[DRAPE_UNKNOWN_SIZE];
+        const int i = drape_registry_find(&drape_reference_registry, NULL, request->command.operand);
+        if (i < 0) {
+            drape_registry_unknown(&drape_reference_registry, NULL, request->command.operand, text);
+            return cli_misuse("validate", "%s", text);
+        }
+        only = drape_references[i];
+    }
+    return request->scenes ? write_scenes(request, only)
+                           : run_references(request->command.ctx, request, only);
 }
 
 const drape_verb drape_verb_validate = {

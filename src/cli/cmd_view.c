@@ -1,6 +1,5 @@
 /* cmd_view.c: `drape view`: a window that shows a running scene. */
 #include "cli/frames.h"
-#include "cli/signals.h"
 #include "cli/view.h"
 
 #include "base/clock.h"
@@ -287,13 +286,6 @@ static void redraw(window_view *w, bool new_model)
         w->quit = true;
 }
 
-static void next_shading(window_view *w, int step)
-{
-    const int count = drape_registry_count(&drape_shading_registry);
-    w->shading = (w->shading + step + count) % count;
-    forget_range(w);
-}
-
 /* Keys that scale a value and keys that move a collider or pin. */
 static void scale_or_move(window_view *w, int key, double factor)
 {
@@ -321,7 +313,7 @@ static void scale_or_move(window_view *w, int key, double factor)
 static void on_key(window_view *w, int key, bool back)
 {
     w->changed = true;
-    const int step = back ? -1 : 1;
+    const int step = back ? -1 : 1, shadings = drape_registry_count(&drape_shading_registry);
     cli_view *v = &w->v;
     switch (key) {
     case ' ':
@@ -348,7 +340,8 @@ static void on_key(window_view *w, int key, bool back)
         w->shown = (w->shown + 1) % PANEL_COUNT;
         break;
     case 'S':
-        next_shading(w, step);
+        w->shading = (w->shading + step + shadings) % shadings;
+        forget_range(w);
         break;
     case 'I':
         redraw(w, view_next_integrator(v, step));
@@ -433,14 +426,6 @@ static void on_move(window_view *w, const drape_input *in)
     w->changed |= w->drag != DRAG_NONE;
 }
 
-static void on_release(window_view *w)
-{
-    if (w->drag == DRAG_NODE)
-        view_drag(&w->v, -1, NULL);
-    w->drag = DRAG_NONE;
-    w->changed = true;
-}
-
 static void take_inputs(window_view *w)
 {
     drape_input in;
@@ -449,26 +434,18 @@ static void take_inputs(window_view *w)
             on_key(w, in.key, in.shift);
         else if (in.kind == DRAPE_INPUT_PRESS)
             on_press(w, &in);
-        else if (in.kind == DRAPE_INPUT_RELEASE)
-            on_release(w);
         else if (in.kind == DRAPE_INPUT_MOVE)
             on_move(w, &in);
-        else {
+        else if (in.kind == DRAPE_INPUT_RELEASE) {
+            if (w->drag == DRAG_NODE)
+                view_drag(&w->v, -1, NULL);
+            w->drag = DRAG_NONE;
+            w->changed = true;
+        } else {
             w->camera.distance *= powf(NOTCH, (float)in.y);
             w->changed = true;
         }
     }
-}
-
-static drape_status follow_size(window_view *w)
-{
-    int width, height;
-    const drape_canvas *canvas = drape_painter_canvas(w->painter);
-    drape_window_size(w->window, &width, &height);
-    if ((width == canvas->width && height == canvas->height) || width < 16 || height < 16)
-        return DRAPE_OK;
-    w->changed = true;
-    return make_painter(w);
 }
 
 /* ---- The loop ---- */
@@ -476,12 +453,18 @@ static drape_status follow_size(window_view *w)
 static drape_status loop(window_view *w)
 {
     drape_status status = DRAPE_OK;
+    int width, height;
     while (!status && !w->quit && !drape_window_closed(w->window) && !cli_interrupted()) {
         double start = drape_clock_seconds();
         bool idle = w->v.paused && !w->changed;
         drape_window_poll(w->window, idle ? IDLE : 0);
         take_inputs(w);
-        status = follow_size(w);
+        drape_window_size(w->window, &width, &height);
+        const drape_canvas *canvas = drape_painter_canvas(w->painter);
+        if ((width != canvas->width || height != canvas->height) && width >= 16 && height >= 16) {
+            w->changed = true;
+            status = make_painter(w);
+        }
         if (status || (w->v.paused && !w->changed))
             continue;
         w->changed = false;

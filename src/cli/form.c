@@ -64,14 +64,6 @@ json_t *cli_value_json(const drape_param *param, const double *value, const char
     return drape_json_number(*value);
 }
 
-static bool is_default(const drape_param *param, const double *value)
-{
-    bool same = true;
-    for (int k = 0; k < drape_param_width(param); k++)
-        same = same && (value[k] == param->default_value || (isnan(value[k]) && isnan(param->default_value)));
-    return same;
-}
-
 json_t *cli_params_json(const drape_param *params, int param_count, const double *values,
                         const drape_choice *choice)
 {
@@ -79,7 +71,10 @@ json_t *cli_params_json(const drape_param *params, int param_count, const double
     for (int p = 0; p < param_count; p++) {
         const double *value = values + drape_param_place(params, p);
         const drape_setting *setting = given(choice, params[p].name);
-        const bool usual = choice ? !setting : is_default(&params[p], value);
+        bool usual = !setting;
+        for (int k = 0; !choice && k < drape_param_width(&params[p]); k++)
+            usual = usual && (value[k] == params[p].default_value ||
+                              (isnan(value[k]) && isnan(params[p].default_value)));
         json_t *one = json_pack("{s:o, s:s, s:b}", "value",
                                 cli_value_json(&params[p], value, setting ? setting->text : NULL), "unit",
                                 params[p].unit, "default", usual);
@@ -135,22 +130,17 @@ static json_t *array_json(const drape_scene_key *key, const char *def)
 }
 
 /* NULL: none is given. */
-static json_t *single_json(const drape_scene_key *key, const void *def)
-{
-    drape_setting value;
-    if (!drape_scene_value(key, def, &value))
-        return NULL;
-    if (value.vector)
-        return drape_json_numbers(value.vector, value.vector_count);
-    return value.text ? drape_json_text(value.text) : cli_value_json(&key->param, &value.number, NULL);
-}
-
 static json_t *key_json(const drape_scene_key *key, const char *def)
 {
     const double *numbers = (const double *)(const void *)(def + key->offset);
+    drape_setting value;
     switch (key->shape) {
     case DRAPE_SCENE_VALUE:
-        return single_json(key, def);
+        if (!drape_scene_value(key, def, &value))
+            return NULL;
+        if (value.vector)
+            return drape_json_numbers(value.vector, value.vector_count);
+        return value.text ? drape_json_text(value.text) : cli_value_json(&key->param, &value.number, NULL);
     case DRAPE_SCENE_LIST:
     case DRAPE_SCENE_TRACK:
     case DRAPE_SCENE_OBJECTS:

@@ -2,7 +2,6 @@
 #include "cli/frames.h"
 
 #include "cli/progress.h"
-#include "cli/signals.h"
 #include "render/shading.h"
 
 #include <inttypes.h>
@@ -24,24 +23,19 @@ int cli_find_shading(const cli_command *command, const char *name, int *index)
     return cli_misuse(command->verb, "--shade: %s", text);
 }
 
-/* "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
-static void make_label(const char *operand, char *label, size_t size)
+/* The label: "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
+int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
+                    cli_source *out)
 {
     const char *end = operand + strlen(operand), *begin;
+    *out = (cli_source){.command = command, .operand = operand};
     while (end > operand && end[-1] == '/')
         end--;
     for (begin = end; begin > operand && begin[-1] != '/'; begin--)
         ;
     if (end - begin > 5 && strncmp(end - 5, ".json", 5) == 0)
         end -= 5;
-    snprintf(label, size, "%.*s", (int)(end - begin), begin);
-}
-
-int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
-                    cli_source *out)
-{
-    *out = (cli_source){.command = command, .operand = operand};
-    make_label(operand, out->label, sizeof out->label);
+    snprintf(out->label, sizeof out->label, "%.*s", (int)(end - begin), begin);
     int code = cli_is_folder(operand) ? cli_run_load(command, operand, &out->in, &out->run)
                                       : cli_scene_load(command, operand, &out->in);
     if (code != CLI_GO_ON)
@@ -68,30 +62,25 @@ void cli_source_free(cli_source *source)
 
 /* ---- From a run ---- */
 
-/* Sets the sim to a frame. Fields may need velocities: they are differences of the frames before and after
- * it. */
-static drape_status set_state(cli_source *s, int64_t frame, double *x, double *v, double *other)
-{
-    drape_record *run = &s->run;
-    int64_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
-    double span = run->times[after] - run->times[before];
-    drape_status status = drape_record_read(run, after, v);
-    if (!status)
-        status = drape_record_read(run, before, other);
-    if (!status)
-        status = drape_record_read(run, frame, x);
-    for (size_t i = 0; i < 3 * (size_t)run->nodes; i++)
-        v[i] = span > 0 ? (v[i] - other[i]) / span : 0;
-    return status ? status : drape_sim_set_state(s->in.sim, run->times[frame], x, v);
-}
-
-/* scratch: (9 nodes) */
+/* Adds a frame to the reel. A field is that of the sim, set to the frame; it may need velocities: they are
+ * differences of the frames before and after it. scratch: (9 nodes) */
 static drape_status read_frame(const cli_frames_def *def, cli_source *s, int64_t frame, double *scratch)
 {
-    size_t n = 3 * (size_t)s->run.nodes;
-    drape_status status = def->field ? set_state(s, frame, scratch, scratch + n, scratch + 2 * n)
-                                     : drape_record_read(&s->run, frame, scratch);
-    return status ? status : drape_reel_add(&s->reel, s->run.times[frame], scratch, s->in.sim, def->field);
+    drape_record *run = &s->run;
+    const size_t n = 3 * (size_t)run->nodes;
+    const int64_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
+    const double span = run->times[after] - run->times[before];
+    double *x = scratch, *v = x + n, *other = v + n;
+    drape_status status = drape_record_read(run, frame, x);
+    if (!status && def->field)
+        status = drape_record_read(run, after, v);
+    if (!status && def->field)
+        status = drape_record_read(run, before, other);
+    for (size_t i = 0; !status && def->field && i < n; i++)
+        v[i] = span > 0 ? (v[i] - other[i]) / span : 0;
+    if (!status && def->field)
+        status = drape_sim_set_state(s->in.sim, run->times[frame], x, v);
+    return status ? status : drape_reel_add(&s->reel, run->times[frame], x, s->in.sim, def->field);
 }
 
 static int read_frames(const cli_frames_def *def, cli_source *s)

@@ -3,7 +3,6 @@
 
 #include "base/arena.h"
 #include "cli/progress.h"
-#include "cli/signals.h"
 #include "drape/lab.h"
 
 #include <limits.h>
@@ -16,50 +15,34 @@ static void show(void *user, int64_t done, int64_t total, double seconds_left)
     cli_progress_count(user, done, total, seconds_left);
 }
 
-/* "1/4" */
-static int read_shard(const cli_lab_request *request, drape_lab_def *def)
+/* Reads the options that are texts: "1/4"; an integer, whose range is checked by the experiment; minutes, or
+ * "none". A shard is part of a sweep that is to run in full: it has no budget unless it is given one. */
+static int read_texts(const cli_lab_request *request, double default_minutes, drape_lab_def *def)
 {
+    const char *shard = request->shard, *levels = request->levels, *budget = request->budget;
     int used = 0;
-    const char *text = request->shard;
-    if (!text)
-        return CLI_GO_ON;
-    if (sscanf(text, "%d/%d%n", &def->shard, &def->shards, &used) != 2 || text[used] || def->shard < 1 ||
-        def->shard > def->shards)
-        return cli_misuse(request->command.verb,
-                          "--shard \"%.60s\": must be I/N, with I from 1 to N, such as 1/4", text);
-    return CLI_GO_ON;
-}
-
-/* Minutes, or "none". A shard is part of a sweep that is to run in full: it has no budget unless it is
- * given one. */
-static int read_budget(const cli_lab_request *request, double default_minutes, drape_lab_def *def)
-{
-    const char *text = request->budget;
     char *end;
-    double minutes = request->shard ? 0 : default_minutes;
-    if (text && strcmp(text, "none") == 0)
+    if (levels) {
+        const long number = strtol(levels, &end, 10);
+        if (end == levels || *end || number < INT_MIN || number > INT_MAX)
+            return cli_misuse(request->command.verb, "--levels \"%.60s\": must be an integer, 3 to 12",
+                              levels);
+        def->levels = (int)number;
+    }
+    if (shard && (sscanf(shard, "%d/%d%n", &def->shard, &def->shards, &used) != 2 || shard[used] ||
+                  def->shard < 1 || def->shard > def->shards))
+        return cli_misuse(request->command.verb,
+                          "--shard \"%.60s\": must be I/N, with I from 1 to N, such as 1/4", shard);
+    double minutes = shard ? 0 : default_minutes;
+    if (budget && strcmp(budget, "none") == 0) {
         minutes = 0;
-    else if (text) {
-        minutes = strtod(text, &end);
-        if (end == text || *end || !(minutes > 0 && minutes < 1e9))
+    } else if (budget) {
+        minutes = strtod(budget, &end);
+        if (end == budget || *end || !(minutes > 0 && minutes < 1e9))
             return cli_misuse(request->command.verb, "--budget \"%.60s\": must be minutes, above 0, or none",
-                              text);
+                              budget);
     }
     def->budget_seconds = 60 * minutes;
-    return CLI_GO_ON;
-}
-
-/* Its range is checked by the experiment. */
-static int read_levels(const cli_lab_request *request, drape_lab_def *def)
-{
-    const char *text = request->levels;
-    char *end;
-    if (!text)
-        return CLI_GO_ON;
-    long number = strtol(text, &end, 10);
-    if (end == text || *end || number < INT_MIN || number > INT_MAX)
-        return cli_misuse(request->command.verb, "--levels \"%.60s\": must be an integer, 3 to 12", text);
-    def->levels = (int)number;
     return CLI_GO_ON;
 }
 
@@ -116,11 +99,7 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     def->strain_limit = request->strain_limit > 0 ? request->strain_limit : def->strain_limit;
     def->progress = show;
     def->cancel = cli_interrupted_by;
-    int code = read_levels(request, def);
-    if (code == CLI_GO_ON)
-        code = read_shard(request, def);
-    if (code == CLI_GO_ON)
-        code = read_budget(request, default_minutes, def);
+    int code = read_texts(request, default_minutes, def);
     if (code == CLI_GO_ON && command->threads)
         code = cli_misuse(
             command->verb,
@@ -147,17 +126,16 @@ int cli_lab_conclude(const cli_command *command, drape_status status, drape_lab_
 int cli_lab_run(const cli_lab_request *request, int default_jobs, double default_minutes)
 {
     const cli_command *command = &request->command;
+    cli_progress progress;
     drape_lab_def def;
-    int code = make_def(request, default_jobs, default_minutes, command->arena, &def);
-    if (code == CLI_GO_ON) {
-        cli_progress progress;
-        drape_lab_outcome outcome;
-        def.user = &progress;
-        cli_progress_begin(&progress, NULL, 0);
-        progress.logs = !progress.on;
-        drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
-        cli_progress_clear(&progress);
-        code = cli_lab_conclude(command, status, &outcome);
-    }
-    return code;
+    drape_lab_outcome outcome;
+    const int code = make_def(request, default_jobs, default_minutes, command->arena, &def);
+    if (code != CLI_GO_ON)
+        return code;
+    def.user = &progress;
+    cli_progress_begin(&progress, NULL, 0);
+    progress.logs = !progress.on;
+    drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
+    cli_progress_clear(&progress);
+    return cli_lab_conclude(command, status, &outcome);
 }

@@ -1,7 +1,6 @@
 /* main.c: the program `drape`: finds the verb, reads its command line, runs it, and checks that its output
  * was written. */
 #include "cli/cli.h"
-#include "cli/signals.h"
 #include "sim/reproducible.h"
 
 #include <errno.h>
@@ -14,24 +13,6 @@
 #include <unistd.h>
 
 #define MIN_STACK (1 << 20) /* [bytes] of each thread; Drape takes up to a quarter, libraries the rest */
-
-/* If the program is started with a standard descriptor closed, a file that is opened later would become, say,
- * the standard output. The substitutes that are opened here fail on use, as the closed descriptor does. */
-static void fill_descriptors(void)
-{
-    static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};
-    for (int fd = 0; fd < 3; fd++)
-        if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", modes[fd]) < 0)
-            return;
-}
-
-/* A closed pipe or a full quota must not end the program: writes are checked. */
-static void ignore_write_signals(void)
-{
-    const struct sigaction ignore = {.sa_handler = SIG_IGN};
-    sigaction(SIGPIPE, &ignore, NULL);
-    sigaction(SIGXFSZ, &ignore, NULL);
-}
 
 static const drape_verb *find_verb(const char *name)
 {
@@ -48,8 +29,16 @@ static int unknown_verb(const char *name)
     return CLI_BAD_INPUT;
 }
 
-static void print_overview(void)
+/* `drape help`, `drape help VERB` */
+static int help(int argc, char **argv)
 {
+    const drape_verb *verb = argc > 2 ? find_verb(argv[2]) : NULL;
+    if (argc > 2 && !verb)
+        return unknown_verb(argv[2]);
+    if (verb) {
+        cli_print_help(verb);
+        return CLI_DONE;
+    }
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
     char operand[64];
     for (int i = 0; drape_verbs[i]; i++) {
@@ -59,18 +48,6 @@ static void print_overview(void)
     puts("\n  drape VERB --help   show the arguments of a verb\n"
          "  drape --version     show the version, and whether results have the same bits on any processor\n\n"
          "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");
-}
-
-/* `drape help`, `drape help VERB` */
-static int help(int argc, char **argv)
-{
-    const drape_verb *verb = argc > 2 ? find_verb(argv[2]) : NULL;
-    if (argc > 2 && !verb)
-        return unknown_verb(argv[2]);
-    if (verb)
-        cli_print_help(verb);
-    else
-        print_overview();
     return CLI_DONE;
 }
 
@@ -83,27 +60,6 @@ static int version(int argc, char **argv)
     printf("licence of libdrape: " DRAPE_LIBRARY_LICENCE "\n");
     printf("licence of the program: " DRAPE_PROGRAM_LICENCE "\n");
     return CLI_DONE;
-}
-
-static int run_verb(const drape_verb *verb, int argc, char **argv)
-{
-    drape_context *ctx = NULL;
-    drape_status status = cli_context_create(&ctx);
-    drape_arena arena = drape_arena_of(ctx);
-    cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
-    int code = CLI_FAILED;
-    if (request) {
-        request->arena = &arena;
-        request->ctx = ctx;
-        code = cli_parse(verb, argc, argv, request);
-        if (code == CLI_GO_ON)
-            code = verb->run(request);
-        drape_arena_free(&arena);
-    } else {
-        cli_misuse(verb->entry.name, "out of memory");
-    }
-    drape_context_destroy(&ctx);
-    return code;
 }
 
 static int run(int argc, char **argv)
@@ -119,23 +75,36 @@ static int run(int argc, char **argv)
         if (strcmp(argv[1], words[i].word) == 0)
             return words[i].run(argc, argv);
     const drape_verb *verb = find_verb(argv[1]);
-    return verb ? run_verb(verb, argc - 1, argv + 1) : unknown_verb(argv[1]);
+    if (!verb)
+        return unknown_verb(argv[1]);
+    drape_context *ctx = NULL;
+    drape_status status = cli_context_create(&ctx);
+    drape_arena arena = drape_arena_of(ctx);
+    cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
+    int code = CLI_FAILED;
+    if (request) {
+        request->arena = &arena;
+        request->ctx = ctx;
+        code = cli_parse(verb, argc - 1, argv + 1, request);
+        if (code == CLI_GO_ON)
+            code = verb->run(request);
+        drape_arena_free(&arena);
+    } else {
+        cli_misuse(verb->entry.name, "out of memory");
+    }
+    drape_context_destroy(&ctx);
+    return code;
 }
 
-/* Whether whoever reads the standard output has closed it, as `head` does: nobody misses the rest. */
-static bool reader_is_gone(void)
-{
-    struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
-    return errno == EPIPE || (poll(&out, 1, 0) == 1 && out.revents & POLLERR);
-}
-
-/* Results that could not be written are a failure, whatever the verb returned. */
+/* Results that could not be written are a failure, whatever the verb returned, unless whoever reads the
+ * standard output has closed it, as `head` does: nobody misses the rest. */
 static int finish_output(int code)
 {
+    struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
     bool lost = ferror(stdout);
     errno = 0;
     lost = fflush(stdout) != 0 || lost;
-    if (!lost || reader_is_gone())
+    if (!lost || errno == EPIPE || (poll(&out, 1, 0) == 1 && out.revents & POLLERR))
         return code;
     if (cli_interrupted())
         return code == CLI_INTERRUPTED ? code : cli_report_interrupted("");
@@ -146,14 +115,22 @@ static int finish_output(int code)
 
 int main(int argc, char **argv)
 {
+    static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};
+    const struct sigaction ignore = {.sa_handler = SIG_IGN};
     struct rlimit stack;
-    fill_descriptors();
+    /* If the program is started with a standard descriptor closed, a file that is opened later would become,
+     * say, the standard output. The substitutes that are opened here fail on use, as the closed descriptor
+     * does. */
+    for (int fd = 0; fd < 3; fd++)
+        if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", modes[fd]) < 0)
+            break;
     if (getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < MIN_STACK) {
         fprintf(stderr, "drape: the stack is limited to %llu KiB, by ulimit -s; at least %d KiB are needed\n",
                 (unsigned long long)stack.rlim_cur / 1024, MIN_STACK / 1024);
         return CLI_FAILED;
     }
-    ignore_write_signals();
+    sigaction(SIGPIPE, &ignore, NULL); /* a closed pipe or a full quota must not end the program: */
+    sigaction(SIGXFSZ, &ignore, NULL); /* writes are checked */
     cli_catch_signals();
     return finish_output(run(argc, argv));
 }

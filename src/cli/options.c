@@ -2,7 +2,6 @@
 #include "cli/cli.h"
 
 #include "base/param.h"
-#include "cli/signals.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -157,19 +156,6 @@ static int add_setting(cli_command *command, const cli_option *option, const cha
     return CLI_GO_ON;
 }
 
-static int add_pointer_and_value(cli_command *command, const cli_option *option, const char *argument)
-{
-    const char *equals = strchr(argument, '=');
-    if (*argument != '/' || !equals)
-        return cli_misuse(command->verb,
-                          "--%s \"%.60s\": must be /pointer=value, such as /integrator/dt=0.001",
-                          option->name, argument);
-    char *pointer = drape_arena_text(command->arena, argument);
-    if (pointer)
-        pointer[equals - argument] = 0;
-    return add_setting(command, option, pointer, equals + 1);
-}
-
 /* "a,b" -> ["a","b"]; "" -> [] */
 static int add_list(cli_command *command, const cli_option *option, const char *argument)
 {
@@ -194,40 +180,13 @@ static int add_list(cli_command *command, const cli_option *option, const char *
     return code;
 }
 
-static int set_number(const cli_command *command, const cli_option *option, const char *argument, int *value)
-{
-    char *end;
-    errno = 0;
-    long number = strtol(argument, &end, 10);
-    if (end == argument || *end || errno || number < 1 || number > option->max)
-        return cli_misuse(command->verb, "--%s \"%.60s\": must be an integer, 1 to %d", option->name,
-                          argument, option->max);
-    *value = (int)number;
-    return CLI_GO_ON;
-}
-
-static int set_real(const cli_command *command, const cli_option *option, const char *argument, double *value)
-{
-    char *end;
-    double number = strtod(argument, &end);
-    if (end == argument || *end || !(number > 0 && number < 1e300))
-        return cli_misuse(command->verb, "--%s \"%.60s\": must be a number above 0", option->name, argument);
-    *value = number;
-    return CLI_GO_ON;
-}
-
-static int add_text(const cli_command *command, const cli_option *option, const char *argument,
-                    cli_texts *texts)
-{
-    if (texts->count == CLI_MAX_TEXTS)
-        return cli_misuse(command->verb, "--%s is given more than %d times", option->name, CLI_MAX_TEXTS);
-    texts->items[texts->count++] = argument;
-    return CLI_GO_ON;
-}
-
 static int set_option(cli_command *command, const cli_option *option, const char *argument)
 {
     void *value = (char *)command + option->offset;
+    cli_texts *texts = value;
+    char *end, *pointer;
+    const char *equals;
+    errno = 0;
     switch (option->kind) {
     case CLI_FLAG:
         *(bool *)value = true;
@@ -238,17 +197,40 @@ static int set_option(cli_command *command, const cli_option *option, const char
                          : cli_misuse(command->verb, "--%s \"\": a name of at least one letter is needed",
                                       option->name);
     case CLI_TEXTS:
-        return add_text(command, option, argument, value);
-    case CLI_NUMBER:
-        return set_number(command, option, argument, value);
-    case CLI_REAL:
-        return set_real(command, option, argument, value);
+        if (texts->count == CLI_MAX_TEXTS)
+            return cli_misuse(command->verb, "--%s is given more than %d times", option->name, CLI_MAX_TEXTS);
+        texts->items[texts->count++] = argument;
+        return CLI_GO_ON;
+    case CLI_NUMBER: {
+        const long number = strtol(argument, &end, 10);
+        *(int *)value = (int)number;
+        return end == argument || *end || errno || number < 1 || number > option->max
+                   ? cli_misuse(command->verb, "--%s \"%.60s\": must be an integer, 1 to %d", option->name,
+                                argument, option->max)
+                   : CLI_GO_ON;
+    }
+    case CLI_REAL: {
+        const double number = strtod(argument, &end);
+        *(double *)value = number;
+        return end == argument || *end || !(number > 0 && number < 1e300)
+                   ? cli_misuse(command->verb, "--%s \"%.60s\": must be a number above 0", option->name,
+                                argument)
+                   : CLI_GO_ON;
+    }
     case CLI_VALUE:
         return add_setting(command, option, option->pointer, argument);
     case CLI_LIST:
         return add_list(command, option, argument);
     case CLI_SET:
-        return add_pointer_and_value(command, option, argument);
+        equals = strchr(argument, '=');
+        if (*argument != '/' || !equals)
+            return cli_misuse(command->verb,
+                              "--%s \"%.60s\": must be /pointer=value, such as /integrator/dt=0.001",
+                              option->name, argument);
+        pointer = drape_arena_text(command->arena, argument);
+        if (pointer)
+            pointer[equals - argument] = 0;
+        return add_setting(command, option, pointer, equals + 1);
     }
     return CLI_BAD_INPUT;
 }
@@ -283,23 +265,6 @@ static int handle(const drape_verb *verb, option_list *list, int code, char **ar
     return unknown_option(verb, list, argv[optind - 1]);
 }
 
-static int take_operands(const drape_verb *verb, int argc, char **argv, cli_command *request)
-{
-    int count = argc - optind, max = verb->max_operands ? verb->max_operands : 1;
-    if (count > max && max > 1)
-        return cli_misuse(verb->entry.name, "at most %d arguments are allowed, %d are given", max, count);
-    if (count > max)
-        return cli_misuse(verb->entry.name, "one %s is allowed, %d are given: \"%.60s\", \"%.60s\"%s",
-                          verb->operand, count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
-    if (count < 1 && !verb->operand_optional)
-        return cli_misuse(verb->entry.name, "%s is missing; `drape %s --help` shows all", verb->operand,
-                          verb->entry.name);
-    request->operand = count ? argv[optind] : NULL;
-    request->operands = argv + optind;
-    request->operand_count = count;
-    return CLI_GO_ON;
-}
-
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request)
 {
     struct option table[MAX_OPTIONS + 2] = {{0}};
@@ -320,5 +285,19 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
     optind = 1;
     while (result == CLI_GO_ON && (code = getopt_long(argc, argv, ":h", table, NULL)) != -1)
         result = handle(verb, &list, code, argv, request);
-    return result == CLI_GO_ON ? take_operands(verb, argc, argv, request) : result;
+    if (result != CLI_GO_ON)
+        return result;
+    const int count = argc - optind, max = verb->max_operands ? verb->max_operands : 1;
+    if (count > max && max > 1)
+        return cli_misuse(verb->entry.name, "at most %d arguments are allowed, %d are given", max, count);
+    if (count > max)
+        return cli_misuse(verb->entry.name, "one %s is allowed, %d are given: \"%.60s\", \"%.60s\"%s",
+                          verb->operand, count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
+    if (count < 1 && !verb->operand_optional)
+        return cli_misuse(verb->entry.name, "%s is missing; `drape %s --help` shows all", verb->operand,
+                          verb->entry.name);
+    request->operand = count ? argv[optind] : NULL;
+    request->operands = argv + optind;
+    request->operand_count = count;
+    return CLI_GO_ON;
 }

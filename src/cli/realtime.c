@@ -2,7 +2,6 @@
 #include "cli/realtime.h"
 
 #include "base/clock.h"
-#include "cli/signals.h"
 #include "model/scene.h"
 
 #include <math.h>
@@ -32,28 +31,6 @@ static void say(cli_realtime *r, const char *format, ...)
     va_end(values);
 }
 
-/* An option that only some methods have stands for the scene's own, as one that is named does. */
-static bool names_method(const cli_realtime *r, const cli_scene *scene)
-{
-    bool named = drape_scene_gives(scene->scene, "/integrator/method");
-    for (size_t i = 0; i < r->command->setting_count; i++)
-        named = named || r->command->settings[i].must_act;
-    return named;
-}
-
-static void choose_threads(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
-{
-    const long there = sysconf(_SC_NPROCESSORS_ONLN), nodes = drape_model_node_count(scene->model),
-               most = 1 + nodes / NODES_THREAD;
-    if (r->command->threads) {
-        say(r, "threads %d: given", def->threads);
-        return;
-    }
-    def->threads = (int)fmax(1, fmin(fmin((double)there, (double)most), 256));
-    say(r, "threads %d: chosen, for %ld nodes and %ld processor%s", def->threads, nodes, there,
-        there > 1 ? "s" : "");
-}
-
 /* Seconds of the steps of a frame with one iteration each, whatever number the trial steps make; 0 if they
  * are not known, because a step failed. */
 static double try_steps(const cli_scene *scene, const drape_sim_def *def)
@@ -75,12 +52,22 @@ static double try_steps(const cli_scene *scene, const drape_sim_def *def)
     return status || isinf(best) ? 0 : best * fmax(1, ceil(frame / dt - 1e-9));
 }
 
-/* The least number: further iterations follow where the estimated error asks for them and there is time. */
-static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, double seconds)
+/* One or two iterations are the least number: further ones follow where the estimated error asks for them and
+ * there is time. */
+static drape_status choose_method(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
 {
     const double budget = 1 / drape_model_frame_rate(scene->model);
-    const int count = seconds > 0 && 2 * seconds <= SHARE * budget ? 2 : 1;
     char text[16];
+    def->integrator = METHOD;
+    say(r, "method %s: chosen, as none is named", METHOD);
+    drape_status status = drape_scene_set(scene->scene, "/integrator/method", "\"" METHOD "\"");
+    if (status || r->iterations_given)
+        return status;
+    r->iterations = (drape_setting){.name = "iterations", .number = 1};
+    def->integrator_settings = &r->iterations;
+    def->integrator_setting_count = 1;
+    const double seconds = try_steps(scene, def);
+    const int count = seconds > 0 && 2 * seconds <= SHARE * budget ? 2 : 1;
     r->iterations.number = count;
     snprintf(text, sizeof text, "%d", count);
     if (seconds > 0)
@@ -91,30 +78,27 @@ static drape_status set_iterations(cli_realtime *r, const cli_scene *scene, doub
     return drape_scene_set(scene->scene, "/integrator/iterations", text);
 }
 
-static drape_status choose_method(cli_realtime *r, const cli_scene *scene, drape_sim_def *def)
-{
-    def->integrator = METHOD;
-    say(r, "method %s: chosen, as none is named", METHOD);
-    drape_status status = drape_scene_set(scene->scene, "/integrator/method", "\"" METHOD "\"");
-    if (status || r->iterations_given)
-        return status;
-    r->iterations = (drape_setting){.name = "iterations", .number = 1};
-    def->integrator_settings = &r->iterations;
-    def->integrator_setting_count = 1;
-    return set_iterations(r, scene, try_steps(scene, def));
-}
-
+/* An option that only some methods have stands for the scene's own, as one that is named does. */
 drape_status cli_realtime_choose(void *user, const cli_scene *scene, drape_sim_def *def)
 {
     cli_realtime *r = user;
-    drape_status status = DRAPE_OK;
+    const long there = sysconf(_SC_NPROCESSORS_ONLN), nodes = drape_model_node_count(scene->model),
+               most = 1 + nodes / NODES_THREAD;
+    bool named = drape_scene_gives(scene->scene, "/integrator/method");
+    for (size_t i = 0; i < r->command->setting_count; i++)
+        named = named || r->command->settings[i].must_act;
     r->iterations_given = drape_scene_gives(scene->scene, "/integrator/iterations");
-    choose_threads(r, scene, def);
-    if (names_method(r, scene))
-        say(r, "method %s: given by the scene or an option", scene->model->integrator.type);
-    else
-        status = choose_method(r, scene, def);
-    return status;
+    if (r->command->threads) {
+        say(r, "threads %d: given", def->threads);
+    } else {
+        def->threads = (int)fmax(1, fmin(fmin((double)there, (double)most), 256));
+        say(r, "threads %d: chosen, for %ld nodes and %ld processor%s", def->threads, nodes, there,
+            there > 1 ? "s" : "");
+    }
+    if (!named)
+        return choose_method(r, scene, def);
+    say(r, "method %s: given by the scene or an option", scene->model->integrator.type);
+    return DRAPE_OK;
 }
 
 /* ---- Frames ---- */
@@ -161,24 +145,17 @@ static double percentile(const cli_realtime *r, double share)
     return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
 }
 
-/* Those that were not chosen. */
-static void say_iterations(cli_realtime *r, const drape_chosen *chosen)
-{
-    const double number = drape_chosen_integrator_value(chosen, "iterations", NAN);
-    if (r->iterations.name)
-        return;
-    if (isnan(number))
-        say(r, "iterations: not a parameter of %s", chosen->integrator->entry.name);
-    else
-        say(r, "iterations %.0f: %s", number, r->iterations_given ? "given" : "the default of the method");
-}
-
 drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
 {
     double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
+    const drape_chosen *chosen = &scene->sim->chosen;
+    const double number = drape_chosen_integrator_value(chosen, "iterations", NAN);
     drape_status status = DRAPE_OK;
     r->result.budget = frame;
-    say_iterations(r, &scene->sim->chosen);
+    if (!r->iterations.name && isnan(number)) /* not chosen */
+        say(r, "iterations: not a parameter of %s", chosen->integrator->entry.name);
+    else if (!r->iterations.name)
+        say(r, "iterations %.0f: %s", number, r->iterations_given ? "given" : "the default of the method");
     while (!status && end - drape_sim_time(scene->sim) - r->result.debt > 1e-9 * frame) {
         drape_realtime report;
         double left = end - drape_sim_time(scene->sim) - r->result.debt;

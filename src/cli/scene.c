@@ -2,7 +2,6 @@
  * file. */
 #include "cli/cli.h"
 #include "cli/ranks.h"
-#include "cli/signals.h"
 
 #include "io/recorder.h"
 #include "model/scene.h"
@@ -10,43 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-
-/* Compiling a scene does not check the formats: only writers of frames know them. */
-static drape_status check_formats(const cli_scene *s)
-{
-    for (size_t i = 0; i < s->model->format_count; i++) {
-        char pointer[64];
-        snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
-        drape_status status = drape_recorder_check(s->ctx, s->sim, pointer, s->model->formats[i]);
-        if (status) {
-            drape_scene_locate_fault(s->scene);
-            return status;
-        }
-    }
-    return DRAPE_OK;
-}
-
-static drape_status load(const cli_command *command, const char *path, cli_choose *choose, void *user,
-                         cli_scene *s)
-{
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
-    def.threads = command->threads ? command->threads : 1;
-    drape_status status = drape_scene_load(s->ctx, path, &s->scene);
-    for (size_t i = 0; !status && i < command->setting_count; i++)
-        status = drape_scene_set(s->scene, command->settings[i].pointer, command->settings[i].value);
-    if (!status)
-        status = drape_scene_compile(s->scene, &s->model);
-    if (!status && choose)
-        status = choose(user, s, &def);
-    status = cli_ranks_share(status, s);
-    if (status)
-        return status;
-    status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
-    if (status && *s->ctx->pointer) /* as where the integrator of the scene does not take its terms */
-        drape_scene_locate_fault(s->scene);
-    return status ? status : check_formats(s);
-}
 
 /* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
 static void print_warning(void *user, drape_log_level level, const char *message)
@@ -74,10 +36,31 @@ int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 }
 
 int cli_scene_load_with(const cli_command *command, const char *path, cli_choose *choose, void *user,
-                        cli_scene *out)
+                        cli_scene *s)
 {
-    *out = (cli_scene){.ctx = command->ctx};
-    drape_status status = load(command, path, choose, user, out);
+    drape_sim_def def;
+    *s = (cli_scene){.ctx = command->ctx};
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = command->threads ? command->threads : 1;
+    drape_status status = drape_scene_load(s->ctx, path, &s->scene);
+    for (size_t i = 0; !status && i < command->setting_count; i++)
+        status = drape_scene_set(s->scene, command->settings[i].pointer, command->settings[i].value);
+    if (!status)
+        status = drape_scene_compile(s->scene, &s->model);
+    if (!status && choose)
+        status = choose(user, s, &def);
+    status = cli_ranks_share(status, s);
+    if (!status) {
+        status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
+        /* compiling a scene does not check the formats: only writers of frames know them */
+        for (size_t i = 0; !status && i < s->model->format_count; i++) {
+            char pointer[64];
+            snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
+            status = drape_recorder_check(s->ctx, s->sim, pointer, s->model->formats[i]);
+        }
+        if (status && *s->ctx->pointer) /* as where the integrator of the scene does not take its terms */
+            drape_scene_locate_fault(s->scene);
+    }
     if (cli_interrupted()) /* even if loading did not notice it */
         return cli_report_interrupted(command->verb);
     return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;

@@ -5,7 +5,6 @@
  */
 #include "cli/schema.h"
 #include "cli/form.h"
-#include "cli/keys.h"
 
 #include "colliders/colliders.h"
 #include "compile/compile.h"
@@ -13,7 +12,6 @@
 #include "events/events.h"
 #include "io/export.h"
 #include "io/json.h"
-#include "model/scene.h"
 #include "terms/terms.h"
 
 #include <math.h>
@@ -67,35 +65,12 @@ static json_t *exactly_one(json_t *object, const char *const *names)
     return drape_json_with(object, "oneOf", each_required(names));
 }
 
-static json_t *at_most_one(const char *const *names)
-{
-    json_t *none = json_pack("{s:{s:o}}", "not", "anyOf", each_required(names));
-    return json_pack("{s:o}", "oneOf", drape_json_append(each_required(names), none));
-}
-
-/* All of the keys, or none. */
-static json_t *all_or_none(json_t *object, const char *const *names)
-{
-    json_t *dependents = json_object();
-    for (int i = 0; names[i]; i++)
-        dependents = drape_json_with(dependents, names[i], words(names));
-    return drape_json_with(object, "dependentRequired", dependents);
-}
-
 /* ---- Parameters and keys ---- */
 
 /* An integer if the value is one: 3 rather than 3.0. */
 static json_t *number(double value)
 {
     return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
-}
-
-static json_t *default_of(const drape_param *p, const double *values)
-{
-    if (drape_param_width(p) > 1)
-        return json_pack("[o, o, o]", number(values[0]), number(values[1]), number(values[2]));
-    return p->kind == DRAPE_PARAM_NUMBER || p->kind == DRAPE_PARAM_INTEGER ? number(*values)
-                                                                           : cli_value_json(p, values, NULL);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)
@@ -108,14 +83,9 @@ static json_t *bounded(const char *type, const drape_param *p)
                : value;
 }
 
-static json_t *vector_of(const drape_param *p)
-{
-    json_t *three_numbers = array_of(bounded("number", p), 3, 3);
-    return p->uniform ? any_of(bounded("number", p), three_numbers) : three_numbers;
-}
-
 static json_t *value_of(const drape_param *p)
 {
+    json_t *three_numbers;
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN: /* the reader takes numbers too */
         return json_pack("{s:[b, b, i, i]}", "enum", true, false, 1, 0);
@@ -124,7 +94,8 @@ static json_t *value_of(const drape_param *p)
     case DRAPE_PARAM_TEXT:
         return json_pack("{s:s, s:i}", "type", "string", "minLength", 1);
     case DRAPE_PARAM_VECTOR:
-        return vector_of(p);
+        three_numbers = array_of(bounded("number", p), 3, 3);
+        return p->uniform ? any_of(bounded("number", p), three_numbers) : three_numbers;
     case DRAPE_PARAM_TURN:
         return numbers(3, 4);
     case DRAPE_PARAM_POINTS:
@@ -150,33 +121,31 @@ static json_t *described(json_t *value, const drape_scene_key *key, bool is_one_
     drape_param_default(p, defaults);
     if (is_one_of || (isnan(*defaults) && !key->literal))
         return value;
-    json_t *one = default_of(p, key->vector ? key->vector : defaults);
+    const double *values = key->vector ? key->vector : defaults;
+    json_t *one = drape_param_width(p) > 1
+                      ? json_pack("[o, o, o]", number(values[0]), number(values[1]), number(values[2]))
+                  : p->kind == DRAPE_PARAM_NUMBER || p->kind == DRAPE_PARAM_INTEGER
+                      ? number(*values)
+                      : cli_value_json(p, values, NULL);
     return drape_json_with(value, "default", key->shape == DRAPE_SCENE_LIST ? json_pack("[o]", one) : one);
 }
 
-static json_t *param(const drape_param *p)
-{
-    return described(value_of(p), &(drape_scene_key){.param = *p}, false);
-}
-
-/* A value of a parameter that several entries have with different bounds must be right for each of them, as
- * for the reader. */
-static json_t *with_param(json_t *properties, const drape_param *p)
-{
-    json_t *schema = param(p), *before = json_object_get(properties, p->name);
-    if (!before)
-        return drape_json_with(properties, p->name, schema);
-    if (json_equal(before, schema)) {
-        json_decref(schema);
-        return properties;
-    }
-    return drape_json_with(properties, p->name, json_pack("{s:[O, o]}", "allOf", before, schema));
-}
-
+/* Adds the parameters of an entry. A value of a parameter that several entries have with different bounds
+ * must be right for each of them, as for the reader. */
 static json_t *with_params(json_t *properties, const drape_entry *entry)
 {
-    for (int i = 0; i < entry->param_count; i++)
-        properties = with_param(properties, &entry->params[i]);
+    for (int i = 0; i < entry->param_count; i++) {
+        const drape_param *p = &entry->params[i];
+        json_t *schema = described(value_of(p), &(drape_scene_key){.param = *p}, false);
+        json_t *before = json_object_get(properties, p->name);
+        if (before && json_equal(before, schema)) {
+            json_decref(schema);
+            continue;
+        }
+        if (before)
+            schema = json_pack("{s:[O, o]}", "allOf", before, schema);
+        properties = drape_json_with(properties, p->name, schema);
+    }
     return properties;
 }
 
@@ -268,11 +237,6 @@ static json_t *names_of(const drape_scene_object *object, const drape_scene_key 
 
 static json_t *object_schema(const drape_scene_object *object);
 
-static json_t *entry_or_name(const drape_scene_key *key)
-{
-    return any_of(entry_names(opening_of(key->child)->table, true), object_schema(key->child));
-}
-
 static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
 {
     switch (key->shape) {
@@ -297,22 +261,21 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     case DRAPE_SCENE_OBJECTS:
         return array_of(object_schema(key->child), key->at_least, key->at_most);
     case DRAPE_SCENE_ENTRIES:
-        return array_of(entry_or_name(key), key->at_least, key->at_most);
+        return array_of(any_of(entry_names(opening_of(key->child)->table, true), object_schema(key->child)),
+                        key->at_least, key->at_most);
     }
     return NULL;
 }
 
-/* An object that itself may be left out cannot be left out if something in it is required. */
-static bool key_is_required(const drape_scene_key *key)
-{
-    const struct opening *opening = key->shape == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
-    if (key->optional)
-        return false;
-    return drape_param_is_required(&key->param) ||
-           (opening && !opening->key && (needs_params(opening->table->entries[0]) || opening->all_of));
-}
-
 /* ---- Objects ---- */
+
+bool cli_is_one_of(const drape_scene_object *form, const drape_scene_key *key)
+{
+    for (int i = 0; form->one_of && form->one_of[i]; i++)
+        if (strcmp(form->one_of[i], key->param.name) == 0)
+            return true;
+    return false;
+}
 
 /* Whether a key is excluded because an alternative to it was chosen. */
 static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)
@@ -335,12 +298,18 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     return properties;
 }
 
+/* An object that itself may be left out cannot be left out if something in it is required. */
 static json_t *required_of(const drape_scene_object *object)
 {
     json_t *required = json_array();
-    for (size_t i = 0; i < object->key_count; i++)
-        if (key_is_required(&object->keys[i]))
-            required = drape_json_append(required, json_string(object->keys[i].param.name));
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        const struct opening *inside = key->shape == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
+        const bool within =
+            inside && !inside->key && (needs_params(inside->table->entries[0]) || inside->all_of);
+        if (!key->optional && (drape_param_is_required(&key->param) || within))
+            required = drape_json_append(required, json_string(key->param.name));
+    }
     return required;
 }
 
@@ -368,19 +337,6 @@ static json_t *entry_schema(const drape_scene_object *object, const char *key, c
     return closed(with_params(properties, entry), with_required(required, entry));
 }
 
-/* Adds the forms that have, instead of the key that opens the object, one of its alternatives. */
-static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object)
-{
-    for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
-        const char *name = object->one_of[i];
-        if (strcmp(name, object->open_with) != 0)
-            forms =
-                drape_json_append(forms, closed(properties_of(object, name),
-                                                drape_json_append(required_of(object), json_string(name))));
-    }
-    return forms;
-}
-
 static json_t *entries_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *forms = json_array();
@@ -388,7 +344,14 @@ static json_t *entries_schema(const drape_scene_object *object, const struct ope
     for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
         if (!is_implied(opening->table, i))
             forms = drape_json_append(forms, entry_schema(object, opening->key, entry));
-    return json_pack("{s:o}", "anyOf", with_closed_forms(forms, object));
+    for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
+        const char *name = object->one_of[i]; /* an alternative to the key that opens the object */
+        if (strcmp(name, object->open_with) != 0)
+            forms =
+                drape_json_append(forms, closed(properties_of(object, name),
+                                                drape_json_append(required_of(object), json_string(name))));
+    }
+    return json_pack("{s:o}", "anyOf", forms);
 }
 
 /* Parameters of all entries of the table; for a table of one entry without a name, its own. */
@@ -410,7 +373,13 @@ static json_t *with_preset(json_t *schema, const struct opening *opening)
     json_t *named = json_pack("{s:[s], s:{s:{s:{s:s}}}}", "required", opening->preset, "properties",
                               opening->preset, "not", "const", "none");
     schema = drape_json_with(schema, "if", named);
-    schema = drape_json_with(schema, "then", all_or_none(at_most_one(opening->one_of), opening->all_of));
+    json_t *none = json_pack("{s:{s:o}}", "not", "anyOf", each_required(opening->one_of));
+    json_t *at_most_one =
+        json_pack("{s:o}", "oneOf", drape_json_append(each_required(opening->one_of), none));
+    json_t *together = json_object(); /* all of the keys, or none */
+    for (int i = 0; opening->all_of[i]; i++)
+        together = drape_json_with(together, opening->all_of[i], words(opening->all_of));
+    schema = drape_json_with(schema, "then", drape_json_with(at_most_one, "dependentRequired", together));
     json_t *all = json_pack("{s:o}", "required", words(opening->all_of));
     return drape_json_with(schema, "else", exactly_one(all, opening->one_of));
 }

@@ -1,6 +1,4 @@
-/* signals.c: see signals.h. */
-#include "cli/signals.h"
-
+/* signals.c: how a signal ends the program. */
 #include "cli/cli.h"
 
 #include <signal.h>
