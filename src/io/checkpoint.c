@@ -28,22 +28,11 @@ static void put_rows(void *user, uint64_t offset, uint64_t size, const drape_row
         drape_file_put_written(c->file, size, *sum, error);
 }
 
-/* Where rank 0 could not begin the file, none opens it. */
-static void open_together(drape_checkpoint *c)
-{
-    char path[DRAPE_RANKS_PATH];
-    const bool begun = c->file && c->file->open;
-    const bool reached = begun && drape_file_reach(c->file, path, sizeof path);
-    const int error = c->ranks->open(c->ranks, reached ? path : NULL);
-    c->together = error == 0;
-    if (begun)
-        drape_file_put_written(c->file, 0, 0, reached ? error : ENAMETOOLONG);
-}
-
 void drape_checkpoint_begin(drape_checkpoint *c, drape_context *ctx, const drape_ranks *ranks,
                             drape_file *file)
 {
     drape_archive *a = &c->archive;
+    char path[DRAPE_RANKS_PATH];
     c->file = file;
     c->ranks = ranks;
     c->together = false;
@@ -53,20 +42,24 @@ void drape_checkpoint_begin(drape_checkpoint *c, drape_context *ctx, const drape
         file->durable = true;
         drape_archive_note(a, drape_file_begin(file));
     }
-    if (ranks)
-        open_together(c);
+    if (!ranks)
+        return;
+    const bool begun = file && file->open, reached = begun && drape_file_reach(file, path, sizeof path);
+    const int error =
+        ranks->open(ranks, reached ? path : NULL); /* where rank 0 could not begin, none opens */
+    c->together = error == 0;
+    if (begun)
+        drape_file_put_written(file, 0, 0, reached ? error : ENAMETOOLONG);
 }
 
-/* What the ranks wrote is on the disk before rank 0 gives the file its name. */
-static void close_together(drape_checkpoint *c)
+drape_status drape_checkpoint_end(drape_checkpoint *c)
 {
+    drape_status status = drape_archive_end(&c->archive);
+    /* What the ranks wrote is on the disk before rank 0 gives the file its name. */
     const int error = c->together ? c->ranks->close(c->ranks, true) : 0;
-    if (c->file && c->file->open)
+    if (c->ranks && c->file && c->file->open)
         drape_file_put_written(c->file, 0, 0, error);
-}
-
-static drape_status finish(drape_checkpoint *c, drape_status status)
-{
+    status = drape_ranks_agree(c->ranks, c->archive.ctx, status);
     if (!c->file)
         return status;
     if (status)
@@ -74,14 +67,6 @@ static drape_status finish(drape_checkpoint *c, drape_status status)
     else
         status = drape_file_finish(c->file);
     return status ? status : drape_file_sync_names(c->file);
-}
-
-drape_status drape_checkpoint_end(drape_checkpoint *c)
-{
-    drape_status status = drape_archive_end(&c->archive);
-    if (c->ranks)
-        close_together(c);
-    return finish(c, drape_ranks_agree(c->ranks, c->archive.ctx, status));
 }
 
 /* ---- For hosts ---- */

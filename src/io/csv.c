@@ -1,4 +1,11 @@
-/* csv.c: see csv.h. */
+/*
+ * csv.c: see csv.h. A row is written by one system call, so that a killed run leaves whole rows. If an
+ * attempt has no diagnostic, the worst_ fields are empty; worst_element is empty for a node.
+ *
+ * The energies of interpolated positions would be wrong: stretching is so stiff that an interpolation error
+ * too small to be seen can have as much energy as the motion itself, and interpolated positions have no
+ * consistent velocities. So a row of a frame contains the energies of an accepted state, and its time.
+ */
 #include "io/csv.h"
 
 #include <inttypes.h>
@@ -47,4 +54,88 @@ drape_status drape_csv_open(drape_context *ctx, drape_folder *folder, const char
         return status;
     drape_file_put_text(file, columns);
     return drape_file_publish(file);
+}
+
+/* ---- The tables of a run ---- */
+
+const char drape_steps_columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
+                                   "kinetic,elastic,gravity,contact,dissipated,numerical,"
+                                   "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
+                                   "error,left,events\n";
+const char drape_energy_columns[] =
+    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
+
+static void put_energy(drape_file *file, const drape_energy *energy)
+{
+    drape_csv_put_number(file, energy->kinetic);
+    drape_csv_put_number(file, energy->elastic);
+    drape_csv_put_number(file, energy->gravity);
+    drape_csv_put_number(file, energy->contact);
+    drape_csv_put_number(file, energy->dissipated);
+    drape_csv_put_number(file, energy->numerical);
+}
+
+/* "heavy@0.12126511814700001;down@0.239389200361": the events that are reported after the attempt. */
+static void put_events(drape_file *file, const drape_event_set *events)
+{
+    drape_file_put_text(file, ",");
+    if (!events || events->reported >= events->pending_count)
+        return;
+    drape_file_put_text(file, "\"");
+    for (int32_t i = events->reported; i < events->pending_count; i++) {
+        const drape_pending_root *p = &events->pending[i];
+        drape_file_put_text(file, i > events->reported ? ";" : "");
+        drape_csv_put_quoted(file, events->watches[p->event].event->name);
+        drape_file_print(file, "@%.17g", p->root.t);
+    }
+    drape_file_put_text(file, "\"");
+}
+
+drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy,
+                               const drape_event_set *events)
+{
+    const drape_diagnostic *worst = &attempt->diagnostic;
+    const char *what = worst->what;
+    drape_file_print(file, "%" PRId64, attempt->index);
+    drape_csv_put_number(file, attempt->t);
+    drape_csv_put_number(file, attempt->h);
+    drape_csv_put_integer(file, attempt->accepted);
+    drape_csv_put_text(file, drape_status_name(attempt->status));
+    drape_csv_put_text(file, attempt->reason);
+    drape_csv_put_integer(file, attempt->iterations);
+    drape_csv_put_number(file, attempt->residual);
+    drape_csv_put_number(file, attempt->tolerance);
+    put_energy(file, energy);
+    if (what && *what) {
+        drape_csv_put_text(file, what);
+        drape_csv_put_text(file, worst->term);
+        if (worst->element >= 0)
+            drape_csv_put_integer(file, worst->element);
+        else
+            drape_file_put_text(file, ",");
+        drape_file_put_text(file, ",");
+        for (int i = 0; i < 4 && worst->node[i] >= 0; i++)
+            drape_file_print(file, "%s%" PRId32, i ? " " : "", worst->node[i]);
+        drape_csv_put_number(file, worst->value);
+        drape_csv_put_number(file, worst->limit);
+    } else {
+        drape_file_put_text(file, ",,,,,,");
+    }
+    drape_csv_put_number(file, attempt->error);
+    drape_csv_put_number(file, attempt->left);
+    put_events(file, events);
+    drape_file_put_text(file, "\n");
+    return drape_file_keep(file);
+}
+
+drape_status drape_energy_write(drape_file *file, int64_t frame, double t, double t_state,
+                                const drape_energy *energy)
+{
+    drape_file_print(file, "%" PRId64, frame);
+    drape_csv_put_number(file, t);
+    drape_csv_put_number(file, t_state);
+    put_energy(file, energy);
+    drape_csv_put_number(file, energy->kinetic + energy->elastic + energy->gravity + energy->contact);
+    drape_file_put_text(file, "\n");
+    return drape_file_keep(file);
 }

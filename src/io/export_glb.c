@@ -483,22 +483,11 @@ static void add_meshes(glb_state *glb)
 }
 
 /* Named materials are those of the artist, to be replaced by name: they are light grey. */
-static void add_materials(glb_state *glb)
-{
-    static const char format[] =
-        "%s{\"name\":%s,\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[%s,1],"
-        "\"metallicFactor\":0,\"roughnessFactor\":0.85}}";
-    add(glb, "\"materials\":[");
-    for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        add(glb, format, p ? "," : "", glb->primitive[p].quoted,
-            *glb->primitive[p].name ? "0.8,0.8,0.8" : "0.55,0.16,0.13");
-    if (glb->def->body_count > 0)
-        add(glb, format, ",", "\"collider\"", "0.35,0.37,0.4");
-    add(glb, "],");
-}
-
 static void make_json(glb_state *glb)
 {
+    static const char material[] =
+        "%s{\"name\":%s,\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[%s,1],"
+        "\"metallicFactor\":0,\"roughnessFactor\":0.85}}";
     add(glb,
         "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape %s\"},\"scene\":0,\"scenes\":[{\"nodes\":[",
         drape_version());
@@ -510,8 +499,13 @@ static void make_json(glb_state *glb)
         glb->object[i].place = add_blanks(glb, i < glb->deforming ? 0 : PLACE_ROOM);
         add(glb, "}");
     }
+    add(glb, "],\"materials\":[");
+    for (uint32_t p = 0; p < glb->object[0].primitives; p++)
+        add(glb, material, p ? "," : "", glb->primitive[p].quoted,
+            *glb->primitive[p].name ? "0.8,0.8,0.8" : "0.55,0.16,0.13");
+    if (glb->def->body_count > 0)
+        add(glb, material, ",", "\"collider\"", "0.35,0.37,0.4");
     add(glb, "],");
-    add_materials(glb);
     add_views(glb);
     add_accessors(glb);
     add_meshes(glb);
@@ -558,8 +552,9 @@ static bool glb_names(const char *name)
     return strcmp(name, FILE_NAME) == 0;
 }
 
-static drape_status allocate(const drape_export_def *def, glb_state *glb)
+static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
+    glb_state *glb = state;
     drape_arena *arena = def->arena;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
@@ -584,13 +579,7 @@ static drape_status allocate(const drape_export_def *def, glb_state *glb)
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     make_json(glb);
-    return DRAPE_OK;
-}
-
-static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
-{
-    drape_status status = allocate(def, state);
-    return status ? status : drape_export_open(ctx, def, FILE_NAME, &((glb_state *)state)->file);
+    return drape_export_open(ctx, def, FILE_NAME, &glb->file);
 }
 
 /* ---- Changes to the beginning of the file ---- */
@@ -721,33 +710,27 @@ static void put_frame(glb_state *glb)
                         glb->object[i].vertices);
 }
 
-/* Translation and rotation, a quaternion x, y, z, w; of the two of a rotation that nearer to the one
- * before. */
-static void find_place(const drape_collider_pose *pose, const float *before, float place[7])
-{
-    double q[4] = {1, 0, 0, 0}, sign = 1;
-    if (pose->turned)
-        drape_rotation_quaternion(pose->turn, q);
-    if (before && q[1] * (double)before[3] + q[2] * (double)before[4] + q[3] * (double)before[5] +
-                          q[0] * (double)before[6] <
-                      0)
-        sign = -1;
-    for (int k = 0; k < 3; k++) {
-        place[k] = (float)pose->displacement[k];
-        place[3 + k] = (float)(sign * q[1 + k]);
-    }
-    place[6] = (float)(sign * q[0]);
-}
-
-/* Where rigid objects are in this frame; the first one is where the scene shows them. */
+/* Where rigid objects are in this frame; the first one is where the scene shows them. Translation and
+ * rotation, a quaternion x, y, z, w; of the two of a rotation that nearer to the one before. */
 static void keep_places(glb_state *glb, const drape_frame *frame)
 {
     for (uint32_t i = glb->deforming; i < glb->objects; i++) {
         const object *o = &glb->object[i];
         const drape_collider_pose *pose = &frame->poses[o->body - glb->def->bodies];
         float first[7], *p = o->moves ? o->moves + 7 * (size_t)glb->frames : first;
-        if (o->moves || glb->frames == 0)
-            find_place(pose, glb->frames ? p - 7 : NULL, p);
+        double q[4] = {1, 0, 0, 0}, sign = 1;
+        if (!o->moves && glb->frames > 0)
+            continue;
+        if (pose->turned)
+            drape_rotation_quaternion(pose->turn, q);
+        if (glb->frames > 0 &&
+            q[1] * (double)p[-4] + q[2] * (double)p[-3] + q[3] * (double)p[-2] + q[0] * (double)p[-1] < 0)
+            sign = -1;
+        for (int k = 0; k < 3; k++) {
+            p[k] = (float)pose->displacement[k];
+            p[3 + k] = (float)(sign * q[1 + k]);
+        }
+        p[6] = (float)(sign * q[0]);
         if (glb->frames == 0)
             fill(glb, o->place, ",\"translation\":[%.9g,%.9g,%.9g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]", p[0],
                  p[1], p[2], p[3], p[4], p[5], p[6]);
@@ -862,8 +845,12 @@ static void fill_channels(glb_state *glb)
 }
 
 /* Times and weights, n + n (n - 1) numbers, then 7 n of each object that moves. */
-static drape_status write_animation(glb_state *glb)
+static drape_status glb_close(drape_context *ctx, void *state)
 {
+    glb_state *glb = state;
+    (void)ctx;
+    if (glb->frames < 2)
+        return DRAPE_OK;
     for (uint32_t i = 0; i < glb->frames; i++)
         drape_file_put_float(&glb->file, glb->times[i]);
     for (uint32_t frame = 0; frame < glb->frames; frame++)
@@ -882,13 +869,6 @@ static drape_status write_animation(glb_state *glb)
     fill_accessors(glb);
     fill_channels(glb);
     return glb->status;
-}
-
-static drape_status glb_close(drape_context *ctx, void *state)
-{
-    glb_state *glb = state;
-    (void)ctx;
-    return glb->frames > 1 ? write_animation(glb) : DRAPE_OK;
 }
 
 /* ---- Checkpoints ---- */

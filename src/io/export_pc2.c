@@ -26,16 +26,6 @@ static bool pc2_names(const char *name)
     return strcmp(name, FILE_NAME) == 0 || strcmp(name, MESH_NAME) == 0;
 }
 
-static void put_header(pc2_state *pc2)
-{
-    drape_file_put(&pc2->file, "POINTCACHE2", 12); /* with its terminating 0 */
-    drape_file_put_word(&pc2->file, 1);
-    drape_file_put_word(&pc2->file, (uint32_t)pc2->def->model->surface.node_count);
-    drape_file_put_float(&pc2->file, 0);
-    drape_file_put_float(&pc2->file, 1);
-    drape_file_put_word(&pc2->file, 0);
-}
-
 static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     pc2_state *pc2 = state;
@@ -43,7 +33,12 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
     drape_status status = drape_export_open(ctx, def, FILE_NAME, &pc2->file);
     if (status || def->resumes)
         return status;
-    put_header(pc2);
+    drape_file_put(&pc2->file, "POINTCACHE2", 12); /* with its terminating 0 */
+    drape_file_put_word(&pc2->file, 1);
+    drape_file_put_word(&pc2->file, (uint32_t)pc2->def->model->surface.node_count);
+    drape_file_put_float(&pc2->file, 0);
+    drape_file_put_float(&pc2->file, 1);
+    drape_file_put_word(&pc2->file, 0);
     return drape_file_publish(&pc2->file);
 }
 

@@ -8,18 +8,6 @@
 #include "io/export.h"
 #include "model/model.h"
 
-static void put_header(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
-{
-    drape_file_print(file,
-                     "ply\nformat binary_little_endian 1.0\ncomment Drape frame %" PRId64 ", t = %.17g s\n",
-                     frame->index, frame->time);
-    drape_file_print(file,
-                     "element vertex %" PRId32 "\nproperty double x\nproperty double y\nproperty double z\n",
-                     surface->node_count);
-    drape_file_print(file, "element face %" PRId32 "\nproperty list uchar int vertex_indices\nend_header\n",
-                     surface->triangle_count);
-}
-
 static drape_status ply_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     const drape_export_def *def = ((drape_frames *)state)->def;
@@ -29,7 +17,15 @@ static drape_status ply_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = drape_frames_begin(def, frame, "ply");
     if (status)
         return status;
-    put_header(def->whole, surface, frame);
+    drape_file_print(def->whole,
+                     "ply\nformat binary_little_endian 1.0\ncomment Drape frame %" PRId64 ", t = %.17g s\n",
+                     frame->index, frame->time);
+    drape_file_print(def->whole,
+                     "element vertex %" PRId32 "\nproperty double x\nproperty double y\nproperty double z\n",
+                     surface->node_count);
+    drape_file_print(def->whole,
+                     "element face %" PRId32 "\nproperty list uchar int vertex_indices\nend_header\n",
+                     surface->triangle_count);
     drape_file_put_doubles(def->whole, frame->positions, 3 * (size_t)surface->node_count);
     for (int32_t i = 0; i < surface->triangle_count; i++, node += 3) {
         drape_file_put(def->whole, "\3", 1);

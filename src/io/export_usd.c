@@ -91,8 +91,18 @@ static bool deforms(const usd_state *usd, const object *o)
 
 /* ---- Names ---- */
 
-/* A name of a prim has letters, digits and underscores, and begins with none of the digits. */
-static void make_identifier(const char *name, char out[NAME_ROOM])
+/* Whether a prim, of a material or an object, has that name already. */
+static bool is_taken(const usd_state *usd, bool of_material, const char *name)
+{
+    bool found = !of_material && strcmp(name, MATERIALS) == 0;
+    for (int32_t i = 0; i < (of_material ? usd->materials : usd->objects) && !found; i++)
+        found = strcmp(of_material ? usd->material[i].prim : usd->object[i].name, name) == 0;
+    return found;
+}
+
+/* The identifier of a name, with a number if it is taken. A name of a prim has letters, digits and
+ * underscores, and begins with none of the digits. */
+static void choose_name(const usd_state *usd, bool of_material, const char *name, char out[NAME_ROOM])
 {
     size_t used = 0;
     if (*name >= '0' && *name <= '9')
@@ -105,32 +115,8 @@ static void make_identifier(const char *name, char out[NAME_ROOM])
     if (used == 0)
         out[used++] = '_';
     out[used] = 0;
-}
-
-static bool object_has(const usd_state *usd, const char *name)
-{
-    bool found = strcmp(name, MATERIALS) == 0;
-    for (int32_t i = 0; i < usd->objects && !found; i++)
-        found = strcmp(usd->object[i].name, name) == 0;
-    return found;
-}
-
-static bool material_has(const usd_state *usd, const char *name)
-{
-    bool found = false;
-    for (int32_t i = 0; i < usd->materials && !found; i++)
-        found = strcmp(usd->material[i].prim, name) == 0;
-    return found;
-}
-
-/* The identifier of a name, with a number if it is taken. */
-static void choose_name(const usd_state *usd, bool (*has)(const usd_state *, const char *), const char *name,
-                        char out[NAME_ROOM])
-{
-    make_identifier(name, out);
-    const size_t length = strlen(out);
-    for (int number = 1; has(usd, out); number++)
-        snprintf(out + length, NAME_ROOM - length, "_%d", number);
+    for (int number = 1; is_taken(usd, of_material, out); number++)
+        snprintf(out + used, NAME_ROOM - used, "_%d", number);
 }
 
 /* The number of a material; -1: there is no such material yet. */
@@ -149,7 +135,7 @@ static void add_material(usd_state *usd, const char *name)
     material *m = &usd->material[usd->materials];
     if (find_material(usd, name) >= 0)
         return;
-    choose_name(usd, material_has, name ? name : PLAIN, m->prim);
+    choose_name(usd, true, name ? name : PLAIN, m->prim);
     m->name = name;
     usd->materials++;
 }
@@ -201,7 +187,7 @@ static drape_status list_objects(usd_state *usd)
         o->cloth = i < surface->cloth_count ? i : -1;
         o->body = o->cloth < 0 ? i - surface->cloth_count : -1;
         const drape_export_body *body = body_of(usd, o);
-        choose_name(usd, object_has, body ? body->name : surface->cloths[i].name, o->name);
+        choose_name(usd, false, body ? body->name : surface->cloths[i].name, o->name);
         usd->objects++;
         o->changes = !body || body->deforms || body->moves;
         o->number = o->changes ? files++ : -1;
@@ -260,19 +246,6 @@ static void put_numbers(drape_file *file, const char *attribute, const int32_t *
     for (size_t i = 0; i < count; i++)
         drape_file_print(file, "%s%" PRId32, i ? ", " : "", numbers[i]);
     drape_file_put_text(file, "]\n");
-}
-
-static void put_material(drape_file *file, const material *m)
-{
-    drape_file_print(file, "def Material \"%s\" (\ndoc = ", m->prim);
-    put_text(file, m->name ? m->name : PLAIN);
-    drape_file_print(file,
-                     "\n)\n{\ntoken outputs:surface.connect = </run/" MATERIALS
-                     "/%s/shader.outputs:surface>\n"
-                     "def Shader \"shader\"\n{\nuniform token info:id = \"UsdPreviewSurface\"\n"
-                     "color3f inputs:diffuseColor = %s\nfloat inputs:roughness = 0.85\n"
-                     "token outputs:surface\n}\n}\n",
-                     m->prim, m->name ? "(0.8, 0.8, 0.8)" : "(0.55, 0.16, 0.13)");
 }
 
 static void put_binding(drape_file *file, const material *m)
@@ -491,8 +464,18 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
     drape_file *file = &first->file;
     put_metadata(usd, first, "run");
     drape_file_put_text(file, "def Xform \"run\"\n{\ndef Scope \"" MATERIALS "\"\n{\n");
-    for (int32_t i = 0; i < usd->materials; i++)
-        put_material(file, &usd->material[i]);
+    for (int32_t i = 0; i < usd->materials; i++) {
+        const material *m = &usd->material[i];
+        drape_file_print(file, "def Material \"%s\" (\ndoc = ", m->prim);
+        put_text(file, m->name ? m->name : PLAIN);
+        drape_file_print(file,
+                         "\n)\n{\ntoken outputs:surface.connect = </run/" MATERIALS
+                         "/%s/shader.outputs:surface>\n"
+                         "def Shader \"shader\"\n{\nuniform token info:id = \"UsdPreviewSurface\"\n"
+                         "color3f inputs:diffuseColor = %s\nfloat inputs:roughness = 0.85\n"
+                         "token outputs:surface\n}\n}\n",
+                         m->prim, m->name ? "(0.8, 0.8, 0.8)" : "(0.55, 0.16, 0.13)");
+    }
     drape_file_put_text(file, "}\n");
     for (int32_t i = 1; i < usd->objects; i++) {
         const object *o = &usd->object[i];
@@ -568,18 +551,13 @@ static drape_status write_next(usd_state *usd, object *o, const drape_frame *fra
     return status;
 }
 
-/* Frames between have whole numbers; that at the end of a run may not. */
-static double code_of(const usd_state *usd, const drape_frame *frame)
-{
-    const double code = frame->time * usd->def->frame_rate, whole = floor(code + .5);
-    return fabs(code - whole) < 1e-6 ? whole : code;
-}
-
 static drape_status usd_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     usd_state *usd = state;
     (void)ctx;
-    usd->code = code_of(usd, frame);
+    /* frames between have whole numbers; that at the end of a run may not */
+    const double code = frame->time * usd->def->frame_rate, whole = floor(code + .5);
+    usd->code = fabs(code - whole) < 1e-6 ? whole : code;
     drape_status status = frame->index == 0 ? write_first(usd, frame) : DRAPE_OK;
     for (int32_t i = usd->objects - 1; i >= 0 && frame->index > 0 && !status; i--)
         if (usd->object[i].changes)

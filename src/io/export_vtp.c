@@ -201,26 +201,6 @@ static void put_cloths(drape_file *file, const array *a)
             drape_file_put_word(file, (uint32_t)c);
 }
 
-static void put_cloth_part(drape_file *file, const drape_render_surface *surface, const drape_frame *frame)
-{
-    const size_t nodes = (size_t)surface->node_count, cells = (size_t)surface->triangle_count;
-    const double *density = frame->energy_density;
-    const cell_densities mean = {surface->triangle, density};
-    const array list[] = {
-        {"Float64", "Points", 3, 3 * nodes, 8, put_doubles, frame->positions, 1},
-        {"Float32", "velocity", 3, 3 * nodes, 4, put_floats, frame->velocities, 1},
-        {"Float32", "energy_density", 1, nodes, 4, put_floats, density, 1},
-        {"UInt8", "pinned", 1, nodes, 1, put_bytes, frame->pinned, 1},
-        {"Float32", "strain_max", 1, cells, 4, put_floats, frame->strain, 2},
-        {"Float32", "strain_min", 1, cells, 4, put_floats, frame->strain + 1, 2},
-        {"Float32", "energy_density", 1, cells, 4, put_cell_densities, &mean, 1},
-        {"Int32", "cloth", 1, cells, 4, put_cloths, surface, 1},
-        {"Int32", "connectivity", 1, 3 * cells, 4, put_words, surface->triangle, 1},
-        {"Int32", "offsets", 1, cells, 4, put_offsets, NULL, 0},
-    };
-    put_part(file, frame->time, list, 4, 10, "strain_max");
-}
-
 /* ---- Colliders ---- */
 
 typedef struct body_points {
@@ -295,6 +275,22 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
 {
     vtp_state *vtp = state;
     const drape_export_def *def = vtp->def;
+    const drape_render_surface *surface = &def->model->surface;
+    const size_t nodes = (size_t)surface->node_count, cells = (size_t)surface->triangle_count;
+    const double *density = frame->energy_density;
+    const cell_densities mean = {surface->triangle, density};
+    const array list[] = {
+        {"Float64", "Points", 3, 3 * nodes, 8, put_doubles, frame->positions, 1},
+        {"Float32", "velocity", 3, 3 * nodes, 4, put_floats, frame->velocities, 1},
+        {"Float32", "energy_density", 1, nodes, 4, put_floats, density, 1},
+        {"UInt8", "pinned", 1, nodes, 1, put_bytes, frame->pinned, 1},
+        {"Float32", "strain_max", 1, cells, 4, put_floats, frame->strain, 2},
+        {"Float32", "strain_min", 1, cells, 4, put_floats, frame->strain + 1, 2},
+        {"Float32", "energy_density", 1, cells, 4, put_cell_densities, &mean, 1},
+        {"Int32", "cloth", 1, cells, 4, put_cloths, surface, 1},
+        {"Int32", "connectivity", 1, 3 * cells, 4, put_words, surface->triangle, 1},
+        {"Int32", "offsets", 1, cells, 4, put_offsets, NULL, 0},
+    };
     drape_status status = DRAPE_OK;
     (void)ctx;
     for (int32_t b = 0; b < def->body_count && !status; b++)
@@ -304,7 +300,7 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
         status = drape_frames_begin(def, frame, "vtp");
     if (status)
         return status;
-    put_cloth_part(def->whole, &def->model->surface, frame);
+    put_part(def->whole, frame->time, list, 4, 10, "strain_max");
     status = drape_file_finish(def->whole);
     return status ? status : pvd_add(vtp, frame);
 }

@@ -196,34 +196,6 @@ drape_status drape_file_check_named(drape_context *ctx, const char *path, const 
 
 /* ---- Opening ---- */
 
-/* A pipe that nobody reads is an error at once. What is then written to it blocks as usual. */
-static int open_device(const char *path)
-{
-    int fd = open(path, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd >= 0)
-        fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
-    return fd;
-}
-
-/* Opens the file under a temporary name, beside its own. */
-static int open_part(drape_file *file)
-{
-    const char *slash = strrchr(file->path, '/');
-    uint64_t number;
-    if (getrandom(&number, sizeof number, 0) != (ssize_t)sizeof number)
-        return -1;
-    if (file->folder)
-        drape_folder_part(file->folder, number, file->part);
-    else
-        snprintf(file->part, file->room, "%.*s.drape-%016" PRIx64 DRAPE_FILE_PART,
-                 slash ? (int)(slash + 1 - file->path) : 0, file->path, number);
-    const int fd =
-        openat(base_of(file), file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, (mode_t)0666);
-    if (fd < 0)
-        *file->part = 0;
-    return fd;
-}
-
 drape_status drape_file_begin(drape_file *file)
 {
     if (file->folder && !drape_folder_is_name(file->path))
@@ -231,11 +203,29 @@ drape_status drape_file_begin(drape_file *file)
                           "cannot write \"%.300s\" into the folder \"%.300s\": not the name of a file in it",
                           file->path, drape_folder_path(file->folder));
     struct stat info;
+    const char *slash = strrchr(file->path, '/');
+    uint64_t number;
     *file->part = 0;
-    const bool device = !file->folder && stat(file->path, &info) == 0 && !S_ISREG(info.st_mode);
-    file->fd = device ? open_device(file->path) : open_part(file);
-    if (file->fd < 0)
-        return fail(file, "write", errno);
+    file->fd = -1;
+    if (!file->folder && stat(file->path, &info) == 0 && !S_ISREG(info.st_mode)) {
+        /* A pipe that nobody reads is an error at once. What is then written to it blocks as usual. */
+        file->fd = open(file->path, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+        if (file->fd >= 0)
+            fcntl(file->fd, F_SETFL, fcntl(file->fd, F_GETFL) & ~O_NONBLOCK);
+    } else if (getrandom(&number, sizeof number, 0) == (ssize_t)sizeof number) { /* a name beside its own */
+        if (file->folder)
+            drape_folder_part(file->folder, number, file->part);
+        else
+            snprintf(file->part, file->room, "%.*s.drape-%016" PRIx64 DRAPE_FILE_PART,
+                     slash ? (int)(slash + 1 - file->path) : 0, file->path, number);
+        file->fd = openat(base_of(file), file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+                          (mode_t)0666);
+    }
+    if (file->fd < 0) {
+        const int error = errno;
+        *file->part = 0;
+        return fail(file, "write", error);
+    }
     file->open = true;
     file->used = 0;
     file->error = 0;
@@ -357,8 +347,8 @@ static drape_status give_name(drape_file *file, bool growing)
     if (!file->folder) {
         status = rename(file->part, file->path) ? fail(file, "write", errno) : DRAPE_OK;
     } else {
-        status = growing ? drape_folder_note_growing(file->folder, file->path, file->fd, file->durable)
-                         : drape_folder_note(file->folder, file->path, &file->sum, file->durable);
+        status =
+            drape_folder_note(file->folder, file->path, growing ? NULL : &file->sum, file->fd, file->durable);
         if (!status)
             status = drape_folder_publish(file->folder, file->part, file->path, &file->last);
     }
@@ -408,15 +398,6 @@ drape_status drape_file_finish(drape_file *file)
     return status;
 }
 
-/* Changes what was read from an offset as the patch will change the file. */
-static void apply(const drape_patch *p, off_t offset, unsigned char *bytes, size_t size)
-{
-    const off_t begin = p->offset > offset ? p->offset : offset, last = p->offset + (off_t)p->size,
-                read = offset + (off_t)size, end = last < read ? last : read;
-    if (begin < end)
-        memcpy(bytes + (begin - offset), p->bytes + (begin - p->offset), (size_t)(end - begin));
-}
-
 int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksum *sum)
 {
     unsigned char bytes[16384];
@@ -425,9 +406,14 @@ int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksu
     while (!error && sum->size < (uint64_t)size) {
         const uint64_t left = (uint64_t)size - sum->size;
         const size_t n = left < sizeof bytes ? (size_t)left : sizeof bytes;
-        error = drape_read_at(fd, bytes, n, (off_t)sum->size);
-        for (const drape_patch *p = patches; p; p = p->next)
-            apply(p, (off_t)sum->size, bytes, n);
+        const off_t offset = (off_t)sum->size;
+        error = drape_read_at(fd, bytes, n, offset);
+        for (const drape_patch *p = patches; p; p = p->next) {
+            const off_t last = p->offset + (off_t)p->size, read = offset + (off_t)n;
+            const off_t begin = p->offset > offset ? p->offset : offset, end = last < read ? last : read;
+            if (begin < end)
+                memcpy(bytes + (begin - offset), p->bytes + (begin - p->offset), (size_t)(end - begin));
+        }
         if (!error)
             drape_checksum_add(sum, bytes, n);
     }
@@ -503,26 +489,22 @@ static int write_at(int fd, off_t offset, const void *data, size_t size)
     return 0;
 }
 
-static drape_status add_patch(drape_file *file, off_t offset, const void *data, size_t size)
-{
-    drape_patch **last = &file->patches;
-    if (offset + (off_t)size > file->size)
-        return fail(file, "continue", EINVAL);
-    while (*last)
-        last = &(*last)->next;
-    *last = drape_alloc(file->ctx, 1, sizeof **last + size);
-    if (!*last)
-        return DRAPE_E_MEMORY;
-    **last = (drape_patch){.offset = offset, .size = size};
-    memcpy((*last)->bytes, data, size);
-    return DRAPE_OK;
-}
-
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
 {
     int error = 0;
-    if (file->resumed)
-        return add_patch(file, offset, data, size);
+    if (file->resumed) {
+        drape_patch **last = &file->patches;
+        if (offset + (off_t)size > file->size)
+            return fail(file, "continue", EINVAL);
+        while (*last)
+            last = &(*last)->next;
+        *last = drape_alloc(file->ctx, 1, sizeof **last + size);
+        if (!*last)
+            return DRAPE_E_MEMORY;
+        **last = (drape_patch){.offset = offset, .size = size};
+        memcpy((*last)->bytes, data, size);
+        return DRAPE_OK;
+    }
     for (const char *from = data; size > 0 && !error;) {
         const size_t part = size < PATCHED ? size : PATCHED;
         error = account(file, offset, from, part);
@@ -620,7 +602,7 @@ drape_status drape_file_compare(drape_file *file)
 drape_status drape_file_trim(drape_file *file)
 {
     int error = 0;
-    drape_status status = drape_folder_note_growing(file->folder, file->path, file->fd, file->durable);
+    drape_status status = drape_folder_note(file->folder, file->path, NULL, file->fd, file->durable);
     for (const drape_patch *p = file->patches; p && !status && !error; p = p->next)
         error = write_at(file->fd, p->offset, p->bytes, p->size);
     if (!status && !error && ftruncate(file->fd, file->kept))
@@ -639,7 +621,8 @@ drape_status drape_file_close(drape_file *file)
     drop(file);
     if (error)
         return fail(file, "close", error);
-    return published ? drape_folder_note(file->folder, file->path, &file->kept_sum, file->durable) : DRAPE_OK;
+    return published ? drape_folder_note(file->folder, file->path, &file->kept_sum, -1, file->durable)
+                     : DRAPE_OK;
 }
 
 /* ---- Folders ---- */

@@ -50,22 +50,6 @@ static drape_status refuse(const drape_folder *f, const char *name, const char *
 
 /* ---- Opening ---- */
 
-/* A folder without flock, as some network file systems are, is used without a lock. */
-static drape_status lock(drape_folder *f)
-{
-    int code;
-    do
-        code = flock(f->fd, (f->shared ? LOCK_SH : LOCK_EX) | LOCK_NB);
-    while (code && errno == EINTR);
-    if (code && errno == EWOULDBLOCK)
-        return drape_fail(
-            f->ctx, DRAPE_E_ARGUMENT,
-            "another process is writing into the folder \"%.500s\"; name another, or wait for it", f->path);
-    if (code)
-        drape_log(f->ctx, DRAPE_LOG_WARNING, "the folder \"%.500s\" cannot be locked", f->path);
-    return DRAPE_OK;
-}
-
 static int open_regular(const drape_folder *f, const char *name)
 {
     return drape_open_regular(f->fd, name, O_RDONLY | O_NOFOLLOW);
@@ -81,24 +65,8 @@ bool drape_folder_is_named(const void *user, const char *name)
     return strcmp(user, name) == 0;
 }
 
-/* A line that cannot be read is left out: what it described is then not ours. */
-static drape_status take_line(drape_folder *f, const char *text, size_t length)
-{
-    json_error_t error;
-    json_t *line = drape_json_read(text, length, 0, &error);
-    const char *name = json_string_value(json_object_get(line, "file"));
-    bool failed = !line && json_error_code(&error) == json_error_out_of_memory;
-    f->known = f->known || json_object_get(line, "manifest");
-    if (drape_folder_is_name(name)) {
-        json_t *lines = json_object_get(f->lines, name);
-        failed = (!lines && json_object_set_new(f->lines, name, lines = json_array())) ||
-                 json_array_append(lines, line);
-    }
-    json_decref(line);
-    return failed ? drape_fail_memory(f->ctx, length) : DRAPE_OK;
-}
-
-/* The manifest of a folder that several processes share may be empty: one of them is about to begin it. */
+/* A line that cannot be read is left out: what it described is then not ours. The manifest of a folder that
+ * several processes share may be empty: one of them is about to begin it. */
 static drape_status read_manifest(drape_folder *f)
 {
     char path[512], *text;
@@ -115,16 +83,30 @@ static drape_status read_manifest(drape_folder *f)
     f->lines = json_object();
     f->torn = !status && size > 0 && text[size - 1] != '\n';
     char *end;
-    for (char *at = text; !status && (end = memchr(at, '\n', size - (size_t)(at - text))); at = end + 1)
-        status = take_line(f, at, (size_t)(end - at));
+    for (char *at = text; !status && (end = memchr(at, '\n', size - (size_t)(at - text))); at = end + 1) {
+        json_error_t error;
+        json_t *line = drape_json_read(at, (size_t)(end - at), 0, &error);
+        const char *name = json_string_value(json_object_get(line, "file"));
+        bool failed = !line && json_error_code(&error) == json_error_out_of_memory;
+        f->known = f->known || json_object_get(line, "manifest");
+        if (drape_folder_is_name(name)) {
+            json_t *lines = json_object_get(f->lines, name);
+            failed = (!lines && json_object_set_new(f->lines, name, lines = json_array())) ||
+                     json_array_append(lines, line);
+        }
+        json_decref(line);
+        status = failed ? drape_fail_memory(f->ctx, (size_t)(end - at)) : DRAPE_OK;
+    }
     drape_free(f->ctx, text);
     if (status || f->known || (size == 0 && f->shared))
         return status;
     return drape_fail(f->ctx, DRAPE_E_ARGUMENT, "\"%.500s\" is not a manifest of Drape; " ADVICE, path);
 }
 
+/* A folder without flock, as some network file systems are, is used without a lock. */
 static drape_status set_up(drape_folder *f, const char *path)
 {
+    int code;
     f->arena = drape_arena_of(f->ctx);
     f->path = drape_arena_text(&f->arena, path);
     if (!f->path)
@@ -137,8 +119,16 @@ static drape_status set_up(drape_folder *f, const char *path)
     f->fd = open(f->path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (f->fd < 0)
         return drape_file_fail(f->ctx, "open the folder", f->path, errno);
-    status = lock(f);
-    return status ? status : read_manifest(f);
+    do
+        code = flock(f->fd, (f->shared ? LOCK_SH : LOCK_EX) | LOCK_NB);
+    while (code && errno == EINTR);
+    if (code && errno == EWOULDBLOCK)
+        return drape_fail(
+            f->ctx, DRAPE_E_ARGUMENT,
+            "another process is writing into the folder \"%.500s\"; name another, or wait for it", f->path);
+    if (code)
+        drape_log(f->ctx, DRAPE_LOG_WARNING, "the folder \"%.500s\" cannot be locked", f->path);
+    return read_manifest(f);
 }
 
 drape_status drape_folder_open(drape_context *ctx, const char *path, bool shared, drape_folder **out)
@@ -345,21 +335,17 @@ void drape_folder_part(const drape_folder *f, uint64_t number, char part[DRAPE_P
     snprintf(part + used, DRAPE_PART_SIZE - (size_t)used, "%016" PRIx64 DRAPE_FILE_PART, number);
 }
 
-static bool is_part(const drape_folder *f, const char *name)
-{
-    char prefix[DRAPE_PART_SIZE];
-    const size_t length = (size_t)put_prefix(f, prefix);
-    return strncmp(name, prefix, length) == 0 && strspn(name + length, "0123456789abcdef") == 16 &&
-           strcmp(name + length + 16, DRAPE_FILE_PART) == 0;
-}
-
 /* Temporary files of other processes that share the folder may be in use. writes: NULL where they are
  * removed, too. */
 static drape_status remove_one(drape_folder *f, const char *name, const claims *c)
 {
     struct stat info = {0};
+    char prefix[DRAPE_PART_SIZE];
+    const size_t length = (size_t)put_prefix(f, prefix);
     const bool claimed = c->clears && c->clears(c->user, name),
-               part = !c->writes && !f->shared && is_part(f, name);
+               part = !c->writes && !f->shared && strncmp(name, prefix, length) == 0 &&
+                      strspn(name + length, "0123456789abcdef") == 16 &&
+                      strcmp(name + length + 16, DRAPE_FILE_PART) == 0;
     if (!part && (!claimed || why_not_ours(f, name, &info) || is_input(f, &info)))
         return DRAPE_OK;
     return unlinkat(f->fd, name, 0) && errno != ENOENT ? fail(f, "remove the old file", name, errno)
@@ -413,14 +399,12 @@ static drape_status add_file(drape_folder *f, const char *name, bool growing, ui
     return add_line(f, line, durable);
 }
 
-drape_status drape_folder_note(drape_folder *f, const char *name, const drape_checksum *sum, bool durable)
-{
-    return add_file(f, name, false, sum->size, sum->sum, durable);
-}
-
-drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd, bool durable)
+drape_status drape_folder_note(drape_folder *f, const char *name, const drape_checksum *sum, int fd,
+                               bool durable)
 {
     uint64_t birth[2];
+    if (sum)
+        return add_file(f, name, false, sum->size, sum->sum, durable);
     return find_birth(fd, birth) ? add_file(f, name, true, birth[0], birth[1], durable)
                                  : fail(f, "write", name, errno);
 }
@@ -463,10 +447,13 @@ static int rename_new(const drape_folder *f, const char *part, const char *name)
 
 /* A manifest that is shared is continued. Otherwise a new one takes the place of the old when it is
  * complete. */
-static drape_status begin_manifest(drape_folder *f)
+drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, const void *user)
 {
     const int flags = O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
     char name[DRAPE_PART_SIZE] = DRAPE_MANIFEST_NAME, head[LINE_SIZE];
+    drape_status status = visit_files(f, remove_one, &(claims){NULL, clears, user});
+    if (status)
+        return status;
     if (!f->shared)
         drape_folder_part(f, 0, name);
     f->torn = f->torn && f->shared;
@@ -474,7 +461,7 @@ static drape_status begin_manifest(drape_folder *f)
     if (f->manifest < 0)
         return fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     snprintf(head, sizeof head, "{\"manifest\":1,\"drape\":\"%.100s\"}", drape_version());
-    drape_status status = add_line(f, head, false);
+    status = add_line(f, head, false);
     if (f->shared)
         return status;
     if (!status)
@@ -487,12 +474,6 @@ static drape_status begin_manifest(drape_folder *f)
     if (status)
         unlinkat(f->fd, name, 0);
     return status;
-}
-
-drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, const void *user)
-{
-    drape_status status = visit_files(f, remove_one, &(claims){NULL, clears, user});
-    return status ? status : begin_manifest(f);
 }
 
 drape_status drape_folder_publish(drape_folder *f, const char *part, const char *name,

@@ -79,11 +79,10 @@ drape_status drape_folder_verify_all(drape_folder *folder, bool complete, const 
 /* A temporary name with a random number. */
 void drape_folder_part(const drape_folder *folder, uint64_t number, char part[DRAPE_PART_SIZE]);
 
-/* Adds a line for a file: complete, with its checksum; or growing, with the identity of its descriptor.
- * durable: the line is on the disk when this returns. Errors: DRAPE_E_FILE. */
-drape_status drape_folder_note(drape_folder *folder, const char *name, const drape_checksum *sum,
+/* Adds a line for a file: complete, with its checksum; or (sum NULL) growing, with the identity of its
+ * descriptor. durable: the line is on the disk when this returns. Errors: DRAPE_E_FILE. */
+drape_status drape_folder_note(drape_folder *folder, const char *name, const drape_checksum *sum, int fd,
                                bool durable);
-drape_status drape_folder_note_growing(drape_folder *folder, const char *name, int fd, bool durable);
 
 /* Renames a temporary file. last: the file that this process wrote under the name before, which it may
  * replace. Errors: DRAPE_E_FILE; then the temporary file is still there. */

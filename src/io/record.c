@@ -123,42 +123,31 @@ static char *next_line(char **rest)
     return line;
 }
 
-/* The text of a file, which is modified. */
-static drape_status read_rows(const drape_record *run, const char *path, char *text,
-                              const char *const *columns, size_t count, drape_row_reader *reader, void *user,
-                              int64_t *rows)
+drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
+                               size_t count, drape_row_reader *reader, void *user, int64_t *rows)
 {
+    char *path = drape_record_path(run->ctx, run->folder, name), *text;
     char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
-    size_t place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
-    char *line = next_line(&text);
+    size_t size, place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
+    if (!path)
+        return DRAPE_E_MEMORY;
+    locale_t old = drape_locale_enter();
+    drape_status status = drape_file_read(run->ctx, path, DRAPE_MAX_TABLE, &text, &size);
+    char *rest = text, *line = status ? NULL : next_line(&rest);
     const size_t names = line ? split(line, cells, MAX_CELLS) : 0;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count && !status; i++) {
         for (place[i] = 0; place[i] < names && strcmp(cells[place[i]], columns[i]) != 0; place[i]++)
             continue;
         if (place[i] == names)
-            return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path,
-                              columns[i]);
+            status = drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path,
+                                columns[i]);
     }
-    for (*rows = 0; (line = next_line(&text));) {
+    for (*rows = 0; !status && (line = next_line(&rest));) {
         const size_t found = split(line, cells, MAX_CELLS);
         for (size_t i = 0; i < count; i++)
             wanted[i] = place[i] < found ? cells[place[i]] : none;
         reader(user, (*rows)++, wanted);
     }
-    return DRAPE_OK;
-}
-
-drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
-                               size_t count, drape_row_reader *reader, void *user, int64_t *rows)
-{
-    char *path = drape_record_path(run->ctx, run->folder, name), *text;
-    size_t size;
-    if (!path)
-        return DRAPE_E_MEMORY;
-    locale_t old = drape_locale_enter();
-    drape_status status = drape_file_read(run->ctx, path, DRAPE_MAX_TABLE, &text, &size);
-    if (!status)
-        status = read_rows(run, path, text, columns, count, reader, user, rows);
     drape_locale_leave(old);
     drape_free(run->ctx, text);
     drape_free(run->ctx, path);

@@ -8,10 +8,10 @@
 
 #include "base/clock.h"
 #include "io/checkpoint.h"
+#include "io/csv.h"
 #include "io/export.h"
 #include "io/scene_copy.h"
 #include "io/summary.h"
-#include "io/tables.h"
 #include "sim/sim.h"
 
 /* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer.
@@ -143,59 +143,28 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     frame->pinned = r->pinned;
 }
 
-/* Puts the vertices of render meshes where the nodes carry them. */
-static void show_positions(drape_recorder *r, drape_frame *frame)
-{
-    const drape_model *model = r->model;
-    frame->positions = frame->nodes;
-    if (!model->surface.bound)
-        return;
-    drape_model_normals(model, frame->nodes, r->normals);
-    drape_render_positions(model, -1, frame->nodes, r->normals, r->surface);
-    frame->positions = r->surface;
-}
-
-/* Where the colliders are at the time of the frame, if a format wants them. */
-static void add_bodies(drape_recorder *r, drape_frame *frame)
-{
-    const drape_motion *motion = drape_system_motion(r->sim->system);
-    for (size_t i = 0; i < r->body_count; i++) {
-        const drape_export_body *body = &r->bodies[i];
-        double *x = r->points + 3 * (size_t)body->first_point;
-        drape_motion_pose(motion, (int32_t)i, frame->time, frame->time, &r->poses[i]);
-        if (body->deforms)
-            drape_motion_points(motion, (int32_t)i, frame->time, x);
-        for (int32_t p = 0; body->deforms && p < body->vertex_count; p++, x += 3)
-            drape_pose_point(&r->poses[i], x, x);
-    }
-    frame->poses = r->poses;
-    frame->points = r->points;
-}
-
-static void rotate_pose(const drape_collider_pose *from, drape_collider_pose *to)
-{
-    double turn[9];
-    memcpy(turn, from->turn, sizeof turn);
-    for (int i = 0; !from->turned && i < 9; i++)
-        turn[i] = i % 4 == 0;
-    for (int k = 0; k < 3; k++) {
-        to->turn[k] = turn[k];
-        to->turn[3 + k] = -turn[6 + k];
-        to->turn[6 + k] = turn[3 + k];
-    }
-    to->turned = true;
-    rotate(from->displacement, 1, to->displacement);
-}
-
+/* The same with z up. */
 static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
     size_t nodes = (size_t)r->model->surface.node_count;
     drape_frame rotated = *frame;
+    double turn[9];
     rotated.positions = rotate(frame->positions, nodes, r->rotated);
     if (frame->velocities)
         rotated.velocities = rotate(frame->velocities, nodes, r->rotated + 3 * nodes);
-    for (size_t i = 0; i < r->body_count; i++)
-        rotate_pose(&r->poses[i], &r->poses[r->body_count + i]);
+    for (size_t i = 0; i < r->body_count; i++) {
+        const drape_collider_pose *from = &r->poses[i];
+        drape_collider_pose *to = &r->poses[r->body_count + i];
+        for (int k = 0; k < 9; k++)
+            turn[k] = from->turned ? from->turn[k] : k % 4 == 0;
+        for (int k = 0; k < 3; k++) {
+            to->turn[k] = turn[k];
+            to->turn[3 + k] = -turn[6 + k];
+            to->turn[6 + k] = turn[3 + k];
+        }
+        to->turned = true;
+        rotate(from->displacement, 1, to->displacement);
+    }
     if (r->body_count > 0) {
         rotated.poses = r->poses + r->body_count;
         rotated.points = rotate(r->points, r->point_count, r->points + 3 * r->point_count);
@@ -207,16 +176,6 @@ static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *fra
 static bool is_shared(const drape_recorder *r, const output *o)
 {
     return r->ranks && o->ops->shared && !r->model->surface.bound;
-}
-
-static void write_outputs(drape_recorder *r, const drape_frame *frame)
-{
-    const drape_frame rotated = r->rotated ? rotated_frame(r, frame) : *frame;
-    for (size_t i = 0; i < r->output_count && !r->failure; i++) {
-        const output *o = &r->outputs[i];
-        if (!is_shared(r, o))
-            note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &rotated));
-    }
 }
 
 /* What this rank has of an array of nodes. */
@@ -237,27 +196,36 @@ static void gather(drape_recorder *r, int array, int width, const double **value
     *values = all;
 }
 
-/* The energy of each node per area, if a format wants any fields. */
-static void find_density(drape_recorder *r)
-{
-    const double *density = r->fields;
-    if (!r->wants_fields)
-        return;
-    drape_sim_energy_density(r->sim, r->fields);
-    gather(r, 2, 1, &density);
-    if (r->ranks && r->progress.writes)
-        memcpy(r->fields, density, (size_t)r->model->node_count * sizeof *density);
-}
-
+/* Writes a frame in all formats and its energies. */
 static void write_all(drape_recorder *r, double time, const double *positions, const double *velocities,
                       const drape_energy *energy)
 {
-    drape_frame frame = {.index = r->progress.frames, .time = time, .nodes = positions};
-    show_positions(r, &frame);
+    const drape_motion *motion = drape_system_motion(r->sim->system);
+    drape_frame frame = {
+        .index = r->progress.frames, .time = time, .nodes = positions, .positions = positions};
+    if (r->model->surface.bound) { /* vertices of render meshes are where the nodes carry them */
+        drape_model_normals(r->model, positions, r->normals);
+        drape_render_positions(r->model, -1, positions, r->normals, r->surface);
+        frame.positions = r->surface;
+    }
     add_fields(r, velocities, &frame);
-    if (r->body_count > 0)
-        add_bodies(r, &frame);
-    write_outputs(r, &frame);
+    for (size_t i = 0; i < r->body_count; i++) { /* where the colliders are at that time */
+        const drape_export_body *body = &r->bodies[i];
+        double *x = r->points + 3 * (size_t)body->first_point;
+        drape_motion_pose(motion, (int32_t)i, time, time, &r->poses[i]);
+        if (body->deforms)
+            drape_motion_points(motion, (int32_t)i, time, x);
+        for (int32_t p = 0; body->deforms && p < body->vertex_count; p++, x += 3)
+            drape_pose_point(&r->poses[i], x, x);
+    }
+    frame.poses = r->poses;
+    frame.points = r->points;
+    const drape_frame rotated = r->rotated ? rotated_frame(r, &frame) : frame;
+    for (size_t i = 0; i < r->output_count && !r->failure; i++) {
+        const output *o = &r->outputs[i];
+        if (!is_shared(r, o))
+            note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? &frame : &rotated));
+    }
     if (!r->failure)
         note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
 }
@@ -289,10 +257,15 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
     for (size_t i = 0; i < r->output_count; i++)
         if (is_shared(r, &r->outputs[i]))
             write_shared(r, &r->outputs[i], positions);
-    find_density(r);
     gather(r, 0, 3, &positions);
-    if (r->wants_fields)
+    if (r->wants_fields) {
+        const double *density = r->fields;
         gather(r, 1, 3, &velocities);
+        drape_sim_energy_density(r->sim, r->fields);
+        gather(r, 2, 1, &density);
+        if (r->ranks && r->progress.writes)
+            memcpy(r->fields, density, (size_t)r->model->node_count * sizeof *density);
+    }
     if (r->progress.writes)
         write_all(r, time, positions, velocities, &energy);
     if (r->failure)
@@ -303,30 +276,6 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
 }
 
 /* ---- Checkpoints ---- */
-
-/* The names of the formats in their order, which is that of the scene's list. */
-static void archive_formats(drape_recorder *r, drape_archive *a)
-{
-    drape_archive_same(a, "the number of formats", (int64_t)r->output_count);
-    for (size_t i = 0; i < r->output_count && drape_archive_good(a); i++) {
-        char there[32];
-        snprintf(there, sizeof there, "%s", r->outputs[i].ops->entry.name);
-        drape_archive_text(a, there, sizeof there);
-        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->entry.name) != 0)
-            drape_archive_fail(a, DRAPE_E_ARGUMENT,
-                               "the checkpoint has frames in \"%s\"; here they are in \"%s\"", there,
-                               r->outputs[i].ops->entry.name);
-    }
-}
-
-static void archive_duration(drape_recorder *r, drape_archive *a)
-{
-    double here = r->sim->model->duration, there = here;
-    drape_archive_double(a, &there);
-    if (drape_archive_good(a) && there != here)
-        drape_archive_fail(a, DRAPE_E_ARGUMENT, "the checkpoint is of a run of %.9g s; this one has %.9g s",
-                           there, here);
-}
 
 /* The files that grow: the tables, then those of the formats. NULL: there are no more. */
 static drape_file *growing(drape_recorder *r, size_t number)
@@ -344,11 +293,26 @@ static drape_file *growing(drape_recorder *r, size_t number)
     return NULL;
 }
 
+/* The names of the formats are in their order, which is that of the scene's list. */
 static void archive_progress(drape_recorder *r, drape_archive *a)
 {
+    const double duration = r->sim->model->duration;
+    double there = duration;
     drape_archive_mark(a, "recorder");
-    archive_formats(r, a);
-    archive_duration(r, a);
+    drape_archive_same(a, "the number of formats", (int64_t)r->output_count);
+    for (size_t i = 0; i < r->output_count && drape_archive_good(a); i++) {
+        char name[32];
+        snprintf(name, sizeof name, "%s", r->outputs[i].ops->entry.name);
+        drape_archive_text(a, name, sizeof name);
+        if (drape_archive_good(a) && strcmp(name, r->outputs[i].ops->entry.name) != 0)
+            drape_archive_fail(a, DRAPE_E_ARGUMENT,
+                               "the checkpoint has frames in \"%s\"; here they are in \"%s\"", name,
+                               r->outputs[i].ops->entry.name);
+    }
+    drape_archive_double(a, &there);
+    if (drape_archive_good(a) && there != duration)
+        drape_archive_fail(a, DRAPE_E_ARGUMENT, "the checkpoint is of a run of %.9g s; this one has %.9g s",
+                           there, duration);
     drape_archive_same(a, "whether frames have z up", r->sim->model->z_up);
     drape_archive_same(a, "the number of vertices in frames", r->model->surface.node_count);
     drape_archive_bool(a, &r->progress.finished);
@@ -378,19 +342,15 @@ static void archive_files(drape_recorder *r, drape_archive *a)
 }
 
 /* All frames that a checkpoint counts must be on the disk before the checkpoint is. */
-static drape_status sync_files(drape_recorder *r)
-{
-    drape_status status = DRAPE_OK;
-    drape_file *file;
-    for (size_t k = 0; !status && (file = growing(r, k)); k++)
-        status = drape_file_sync(file);
-    return status ? status : drape_folder_sync(r->folder);
-}
-
 static drape_status write_checkpoint(drape_recorder *r)
 {
     drape_checkpoint c;
-    drape_status status = r->progress.writes ? sync_files(r) : DRAPE_OK;
+    drape_status status = DRAPE_OK;
+    drape_file *file;
+    for (size_t k = 0; r->progress.writes && !status && (file = growing(r, k)); k++)
+        status = drape_file_sync(file);
+    if (r->progress.writes && !status)
+        status = drape_folder_sync(r->folder);
     if (drape_ranks_any(r->ranks, status != DRAPE_OK))
         return status;
     r->progress.wall = drape_clock_seconds() - r->start;
@@ -417,21 +377,6 @@ drape_status drape_recorder_checkpoint(drape_recorder *r)
 
 /* ---- Events of the sim ---- */
 
-static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
-{
-    drape_energy energy = drape_sim_energy(r->sim);
-    r->moved = r->moved || attempt->accepted;
-    if (r->progress.writes)
-        note(r, drape_steps_write(&r->steps, attempt, &energy, &r->sim->events));
-}
-
-/* A rank that could not write the frame has not counted it. */
-static void write_due_checkpoint(drape_recorder *r)
-{
-    if (r->every > 0 && !report(r) && r->progress.frames % r->every == 0)
-        note(r, write_checkpoint(r));
-}
-
 static drape_status observe(void *user, const drape_event *event)
 {
     drape_recorder *r = user;
@@ -439,17 +384,17 @@ static drape_status observe(void *user, const drape_event *event)
         return DRAPE_OK;
     if (r->failure)
         return report(r);
-    scope s = scope_enter();
-    switch (event->kind) {
-    case DRAPE_EVENT_ATTEMPT:
-        write_attempt(r, event->attempt);
-        break;
-    case DRAPE_EVENT_FRAME:
+    scope s = scope_enter(); /* the summary has the events of the kind DRAPE_EVENT_ROOT */
+    if (event->kind == DRAPE_EVENT_ATTEMPT) {
+        const drape_energy energy = drape_sim_energy(r->sim);
+        r->moved = r->moved || event->attempt->accepted;
+        if (r->progress.writes)
+            note(r, drape_steps_write(&r->steps, event->attempt, &energy, &r->sim->events));
+    } else if (event->kind == DRAPE_EVENT_FRAME) {
         write_frame(r, event->time, event->positions, event->velocities);
-        write_due_checkpoint(r);
-        break;
-    case DRAPE_EVENT_ROOT: /* the summary has them */
-        break;
+        /* a rank that could not write the frame has not counted it */
+        if (r->every > 0 && !report(r) && r->progress.frames % r->every == 0)
+            note(r, write_checkpoint(r));
     }
     scope_leave(r, s);
     return report(r);
@@ -654,7 +599,8 @@ static drape_status begin_files(drape_recorder *r)
                   : drape_csv_open(r->ctx, r->folder, DRAPE_ENERGY_NAME, drape_energy_columns, &r->energies);
 }
 
-/* Opens all files that grow, and reads from the checkpoint how far they do. */
+/* Opens all files that grow, reads from the checkpoint how far they do, and checks that all files have the
+ * bytes that the checkpoint and the manifest describe; nothing is changed. */
 static drape_status reopen_files(drape_recorder *r, drape_archive *a)
 {
     drape_file *file;
@@ -670,14 +616,6 @@ static drape_status reopen_files(drape_recorder *r, drape_archive *a)
     for (size_t k = 0; !status && (file = growing(r, k)); k++)
         if (file->kept > 0)
             status = drape_file_reopen(file);
-    return status;
-}
-
-/* Whether all files have the bytes that the checkpoint and the manifest describe; nothing is changed. */
-static drape_status check_files(drape_recorder *r)
-{
-    drape_file *file;
-    drape_status status = DRAPE_OK;
     for (size_t i = 0; i < r->output_count && !status; i++) {
         const output *o = &r->outputs[i];
         for (int64_t k = 0; o->ops->ending && k < r->progress.frames && !status; k++) {
@@ -697,17 +635,16 @@ static drape_status check_files(drape_recorder *r)
  * another run and stay as they are. */
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
+    const bool finished = r->progress.finished;
     drape_file *file;
-    drape_status status = r->progress.finished ? drape_archive_end(a) : DRAPE_OK;
+    drape_status status = finished ? drape_archive_end(a) : DRAPE_OK;
     if (!status)
-        status = drape_folder_verify_all(r->folder, r->progress.finished, DRAPE_SUMMARY_NAME);
-    if (!status && !r->progress.finished)
+        status = drape_folder_verify_all(r->folder, finished, DRAPE_SUMMARY_NAME);
+    if (!status && !finished)
         status = reopen_files(r, a);
-    if (!status && !r->progress.finished)
-        status = check_files(r);
     if (!status)
         status = drape_folder_begin(r->folder, NULL, r);
-    if (status || r->progress.finished)
+    if (status || finished)
         return status;
     for (size_t k = 0; !status && (file = growing(r, k)); k++)
         status = file->kept > 0 ? drape_file_trim(file) : drape_file_begin(file);
@@ -726,16 +663,6 @@ static void close_files(drape_recorder *r)
 }
 
 /* ---- Creation ---- */
-
-static drape_status check_def(drape_context *ctx, const drape_sim *sim, const drape_recorder_def *def)
-{
-    if (!sim || !def || !def->folder || !*def->folder)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder needs a sim and the name of a folder");
-    if (def->format_count && !def->formats)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
-                          def->format_count);
-    return DRAPE_OK;
-}
 
 static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
 {
@@ -767,9 +694,12 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     if (!out)
         return DRAPE_E_ARGUMENT;
     *out = NULL;
-    drape_status status = check_def(ctx, sim, def);
-    if (status)
-        return status;
+    if (!sim || !def || !def->folder || !*def->folder)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder needs a sim and the name of a folder");
+    if (def->format_count && !def->formats)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
+                          def->format_count);
+    drape_status status = DRAPE_OK;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
     if (drape_ranks_agree_memory(drape_model_ranks(sim->model), ctx, r)) {
         drape_free(ctx, r);
@@ -799,20 +729,15 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
 
 /* ---- The end ---- */
 
-static bool last_frame_is_due(const drape_recorder *r)
-{
-    double t = drape_sim_time(r->sim);
-    return !r->counted &&
-           (r->progress.frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t));
-}
-
 drape_status drape_recorder_finish(drape_recorder *r)
 {
     if (r->progress.finished)
         return report(r);
     scope s = scope_enter();
-    if (!r->failure && last_frame_is_due(r))
-        write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim), drape_sim_velocities(r->sim));
+    const double t = drape_sim_time(r->sim);
+    const bool shown = r->progress.frames > 0 && !r->moved && fabs(t - r->last_time) <= SAME_TIME * fabs(t);
+    if (!r->failure && !r->counted && !shown)
+        write_frame(r, t, drape_sim_positions(r->sim), drape_sim_velocities(r->sim));
     close_files(r);
     scope_leave(r, s);
     r->progress.finished = true;

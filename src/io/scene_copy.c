@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/param.h"
 #include "io/file.h"
 #include "model/scene_text.h"
 
@@ -59,74 +60,41 @@ static drape_status visit_file(const visitor *v, const char *file, const char *p
     return status;
 }
 
-static bool is_text(const drape_collider *collider, const char *name)
-{
-    for (int i = 0; i < collider->ops->entry.param_count; i++)
-        if (strcmp(collider->ops->entry.params[i].name, name) == 0)
-            return collider->ops->entry.params[i].kind == DRAPE_PARAM_TEXT;
-    return false;
-}
-
-static drape_status visit_collider(const visitor *v, const drape_collider *collider, int index)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < collider->choice.setting_count; i++) {
-        const drape_setting *setting = &collider->choice.settings[i];
-        char pointer[DRAPE_POINTER_SIZE];
-        snprintf(pointer, sizeof pointer, "/colliders/%d/%s", index, setting->name);
-        if (setting->text && is_text(collider, setting->name))
-            status = visit_file(v, setting->text, pointer);
-    }
-    return status;
-}
-
-static drape_status visit_cloth(const visitor *v, const drape_cloth *cloth, int index)
-{
-    const struct {
-        const char *file, *key;
-    } named[] = {{cloth->file, "mesh/file"},
-                 {cloth->start_file, "start/file"},
-                 {cloth->velocity_file, "start/velocities"},
-                 {cloth->render_file, "render_mesh/file"}};
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < sizeof named / sizeof *named; i++) {
-        char pointer[DRAPE_POINTER_SIZE];
-        snprintf(pointer, sizeof pointer, "/cloth/%d/%s", index, named[i].key);
-        if (named[i].file)
-            status = visit_file(v, named[i].file, pointer);
-    }
-    return status;
-}
-
 drape_status drape_scene_files(drape_context *ctx, const drape_model *model, const char *scene,
                                drape_file_visit *visit, void *user)
 {
     const visitor v = {ctx, scene, visit, user};
+    char pointer[DRAPE_POINTER_SIZE];
     drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < model->cloth_count; i++)
-        status = visit_cloth(&v, &model->cloths[i], (int)i);
-    for (int32_t i = 0; !status && i < model->collider_count; i++)
-        status = visit_collider(&v, &model->colliders[i], (int)i);
+    for (int c = 0; c < model->cloth_count; c++) {
+        const drape_cloth *cloth = &model->cloths[c];
+        const struct {
+            const char *file, *key;
+        } named[] = {{cloth->file, "mesh/file"},
+                     {cloth->start_file, "start/file"},
+                     {cloth->velocity_file, "start/velocities"},
+                     {cloth->render_file, "render_mesh/file"}};
+        for (size_t i = 0; !status && i < sizeof named / sizeof *named; i++) {
+            snprintf(pointer, sizeof pointer, "/cloth/%d/%s", c, named[i].key);
+            if (named[i].file)
+                status = visit_file(&v, named[i].file, pointer);
+        }
+    }
+    for (int c = 0; c < model->collider_count; c++) {
+        const drape_collider *collider = &model->colliders[c];
+        const drape_entry *entry = &collider->ops->entry;
+        for (size_t i = 0; !status && i < collider->choice.setting_count; i++) {
+            const drape_setting *setting = &collider->choice.settings[i];
+            const int param = drape_param_find(entry->params, entry->param_count, setting->name);
+            snprintf(pointer, sizeof pointer, "/colliders/%d/%s", c, setting->name);
+            if (setting->text && param >= 0 && entry->params[param].kind == DRAPE_PARAM_TEXT)
+                status = visit_file(&v, setting->text, pointer);
+        }
+    }
     return status;
 }
 
 /* ---- Copies ---- */
-
-static drape_status copy_bytes(copier *c, int from, const char *source)
-{
-    char bytes[COPIED_ONCE];
-    ssize_t count;
-    drape_status status = drape_file_begin(&c->out);
-    if (status)
-        return status;
-    while ((count = read(from, bytes, sizeof bytes)) != 0) {
-        if (count < 0 && errno != EINTR)
-            return drape_file_fail(c->ctx, "read the file", source, errno);
-        if (count > 0)
-            drape_file_put(&c->out, bytes, (size_t)count);
-    }
-    return drape_file_finish(&c->out);
-}
 
 /* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by its
  * whole path. */
@@ -145,19 +113,13 @@ static drape_status keep_path(copier *c, const char *source, const char *pointer
     return status;
 }
 
-/* The ending of a file, with its dot, for the name of its copy; "" if it tells no format. */
-static const char *ending_of(const char *source)
-{
-    const char *dot = strrchr(source, '.');
-    const size_t length = dot ? strspn(dot + 1, ALPHANUMERIC) : 0;
-    return length > 0 && length <= MAX_ENDING && !dot[1 + length] ? dot : "";
-}
-
 /* A file that cannot be read twice, such as a pipe, is not copied. */
 static drape_status copy_file(void *user, const char *source, const char *pointer)
 {
     copier *c = user;
     struct stat info;
+    char bytes[COPIED_ONCE];
+    ssize_t count = 0;
     if (stat(source, &info) || S_ISDIR(info.st_mode))
         return keep_path(c, source, pointer);
     if (!S_ISREG(info.st_mode))
@@ -165,8 +127,19 @@ static drape_status copy_file(void *user, const char *source, const char *pointe
     const int from = drape_file_open(c->ctx, source);
     if (from < 0)
         return DRAPE_E_FILE;
-    drape_file_name(&c->out, MESH_NAME, c->files++, ending_of(source));
-    drape_status status = copy_bytes(c, from, source);
+    const char *dot = strrchr(source, '.');
+    const size_t length = dot ? strspn(dot + 1, ALPHANUMERIC) : 0;
+    const bool tells = length > 0 && length <= MAX_ENDING && !dot[1 + length]; /* which format it has */
+    drape_file_name(&c->out, MESH_NAME, c->files++, tells ? dot : "");
+    drape_status status = drape_file_begin(&c->out);
+    while (!status && (count = read(from, bytes, sizeof bytes)) != 0) {
+        if (count > 0)
+            drape_file_put(&c->out, bytes, (size_t)count);
+        else if (errno != EINTR)
+            status = drape_file_fail(c->ctx, "read the file", source, errno);
+    }
+    if (!status)
+        status = drape_file_finish(&c->out);
     close(from);
     return status ? status : drape_scene_set(c->scene, pointer, c->out.path);
 }
@@ -178,16 +151,6 @@ static void put(void *user, const char *text, size_t size)
     drape_file_put(user, text, size);
 }
 
-static drape_status keep_scene(copier *c)
-{
-    drape_file_name(&c->out, DRAPE_SCENE_COPY);
-    drape_status status = drape_file_begin(&c->out);
-    if (status)
-        return status;
-    drape_scene_print(c->scene, put, &c->out);
-    return drape_file_finish(&c->out);
-}
-
 drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drape_model *model,
                               const char *path, drape_folder *folder)
 {
@@ -195,8 +158,13 @@ drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drap
     drape_status status = drape_file_create_in(ctx, folder, &c.out);
     if (!status)
         status = drape_scene_files(ctx, model, path, copy_file, &c);
+    drape_file_name(&c.out, DRAPE_SCENE_COPY);
     if (!status)
-        status = keep_scene(&c);
+        status = drape_file_begin(&c.out);
+    if (!status) {
+        drape_scene_print(scene, put, &c.out);
+        status = drape_file_finish(&c.out);
+    }
     drape_file_destroy(&c.out);
     return status;
 }

@@ -104,19 +104,6 @@ static json_t *energy(drape_sim *sim)
     return with_reals(json_object(), parts, LENGTH(parts));
 }
 
-/* For an equilibrium: whether it is stable, and the number of negative eigenvalues of its Hessian. */
-static json_t *stability(const drape_statistics *s)
-{
-    json_t *object = drape_json_with(json_object(), "stable", json_boolean(s->unstable_modes == 0));
-    return drape_json_with(object, "unstable_modes", json_integer(s->unstable_modes));
-}
-
-static json_t *strain(const drape_statistics *s)
-{
-    const real_item bounds[] = {{"min", s->strain_min}, {"max", s->strain_max}};
-    return with_reals(json_object(), bounds, LENGTH(bounds));
-}
-
 static json_t *realtime(const drape_summary_realtime *r)
 {
     const count_item counts[] = {
@@ -205,14 +192,6 @@ static json_t *with_untangling(json_t *object, const drape_sim *sim)
     return drape_json_with(object, "untangling", drape_json_with(one, "cloths", list));
 }
 
-/* The time and value of an event, and the direction in which its bound was passed. */
-static json_t *root(const drape_event_root *r)
-{
-    const real_item numbers[] = {{"time", r->t}, {"value", r->value}};
-    json_t *one = with_reals(json_object(), numbers, LENGTH(numbers));
-    return drape_json_with(one, "direction", json_string(r->direction > 0 ? "up" : "down"));
-}
-
 /* For each event, if there are any: how often it occurred, and the first times. */
 static json_t *with_events(json_t *object, const drape_sim *sim)
 {
@@ -220,8 +199,12 @@ static json_t *with_events(json_t *object, const drape_sim *sim)
     for (int32_t i = 0; i < sim->events.count; i++) {
         const drape_watch *w = &sim->events.watches[i];
         json_t *times = json_array();
-        for (int64_t k = 0; k < w->count && k < DRAPE_EVENT_TIMES; k++)
-            times = drape_json_append(times, root(&w->first[k]));
+        for (int64_t k = 0; k < w->count && k < DRAPE_EVENT_TIMES; k++) {
+            const drape_event_root *r = &w->first[k];
+            times = drape_json_append(times, json_pack("{s:o, s:o, s:s}", "time", drape_json_number(r->t),
+                                                       "value", drape_json_number(r->value), "direction",
+                                                       r->direction > 0 ? "up" : "down"));
+        }
         json_t *one = drape_json_with(json_object(), "name", drape_json_text(w->event->name));
         one = drape_json_with(one, "count", json_integer((json_int_t)w->count));
         list = drape_json_append(list, drape_json_with(one, "occurrences", times));
@@ -276,13 +259,6 @@ static json_t *warnings(drape_sim *sim)
     return NULL;
 }
 
-static json_t *hash(const drape_sim *sim)
-{
-    char digits[17];
-    snprintf(digits, sizeof digits, "%016" PRIx64, drape_sim_hash(sim));
-    return json_string(digits);
-}
-
 static json_t *summary(drape_sim *sim, const drape_summary_def *def)
 {
     const drape_model *model = drape_sim_model(sim);
@@ -291,6 +267,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                 {"dofs", drape_model_dof_count(model)},
                                 {"nnz", drape_model_nonzero_count(model)},
                                 {"frames", def->frames}};
+    const real_item strains[] = {{"min", s.strain_min}, {"max", s.strain_max}};
+    char digits[17];
     json_t *object = drape_json_with(json_object(), "status", json_string(drape_status_name(def->status)));
     object = drape_json_with(object, "message", drape_json_text(def->message ? def->message : ""));
     object = drape_json_with(object, "version", json_string(drape_version()));
@@ -303,9 +281,11 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
         object = drape_json_with(object, "error", error(&s, &sim->left));
     object = drape_json_with(object, "wall_s", wall(def, &s));
     object = drape_json_with(object, "energy", energy(sim));
-    object = drape_json_with(object, "strain", strain(&s));
-    if (s.stability_known)
-        object = drape_json_with(object, "equilibrium", stability(&s));
+    object = drape_json_with(object, "strain", with_reals(json_object(), strains, LENGTH(strains)));
+    if (s.stability_known) /* of an equilibrium; the number is that of negative eigenvalues of its Hessian */
+        object = drape_json_with(object, "equilibrium",
+                                 json_pack("{s:b, s:I}", "stable", s.unstable_modes == 0, "unstable_modes",
+                                           (json_int_t)s.unstable_modes));
     if (model->part) /* what follows needs the whole model */
         return drape_json_with(object, "ranks", json_integer(model->part->ranks->count));
     object = with_inside(object, sim);
@@ -316,18 +296,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = drape_json_with(object, "warnings", warnings(sim));
     if (def->realtime)
         object = drape_json_with(object, "realtime", realtime(def->realtime));
-    return drape_json_with(object, "hash", hash(sim));
-}
-
-static drape_status write_json(drape_context *ctx, const json_t *json, drape_folder *folder, const char *path,
-                               drape_file *file)
-{
-    drape_status status = drape_export_begin(ctx, folder, path, file);
-    if (status)
-        return status;
-    drape_json_put(file, json, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
-    drape_file_put_text(file, "\n");
-    return drape_file_finish(file);
+    snprintf(digits, sizeof digits, "%016" PRIx64, drape_sim_hash(sim));
+    return drape_json_with(object, "hash", json_string(digits));
 }
 
 drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape_summary_def *def,
@@ -344,7 +314,12 @@ drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape
     if (!json || drape_memory_ran_out())
         status = drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
     else if (!ranks || ranks->rank == 0) /* rank 0 writes it */
-        status = write_json(ctx, json, folder, path, &file);
+        status = drape_export_begin(ctx, folder, path, &file);
+    if (!status && file.open) {
+        drape_json_put(&file, json, JSON_INDENT(2) | JSON_REAL_PRECISION(17));
+        drape_file_put_text(&file, "\n");
+        status = drape_file_finish(&file);
+    }
     json_decref(json);
     drape_file_destroy(&file);
     drape_locale_leave(old);

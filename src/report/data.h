@@ -2,7 +2,20 @@
 #ifndef DRAPE_REPORT_DATA_H
 #define DRAPE_REPORT_DATA_H
 
-#include "report/source.h"
+#include <jansson.h>
+
+#include "base/arena.h"
+#include "io/record.h"
+#include "model/model.h"
+
+/* What a page is made from: the frames and tables of a run, its scene, compiled again, and its summary. */
+typedef struct drape_report_source {
+    drape_context *ctx;
+    drape_record record;
+    drape_model *model;
+    char *scene_text;
+    json_t *summary; /* NULL: the run did not end */
+} drape_report_source;
 
 /* A field at the nodes of the surface that frames show, which is a render mesh where a cloth has one, in all
  * kept frames: the integer i stands for low + i step. */

@@ -2,16 +2,55 @@
  * Drape is built; the data of the run go between its two parts. */
 #include "report/report.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "base/json_read.h"
+#include "io/csv.h"
 #include "io/export.h"
 #include "io/summary.h"
-#include "io/tables.h"
+#include "model/scene.h"
 #include "report/data.h"
 #include "report/page.h"
 
 #define DEFAULT_NAME "report.html"
+#define SCENE_LIMIT  ((off_t)64 << 20)
+
+/* ---- What is read ---- */
+
+static drape_status read_run(drape_context *ctx, const char *folder, drape_report_source *source)
+{
+    char *scene, *text = NULL;
+    size_t size = 0;
+    json_error_t error = {0};
+    *source = (drape_report_source){.ctx = ctx};
+    drape_status status = drape_record_scene(ctx, folder, &scene);
+    if (!status)
+        status = drape_file_read(ctx, scene, SCENE_LIMIT, &source->scene_text, &size);
+    if (!status)
+        status = drape_model_load(ctx, scene, &source->model);
+    drape_free(ctx, scene);
+    if (!status)
+        status = drape_record_open(ctx, folder, source->model->node_count, &source->record);
+    char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
+    if (status || !path)
+        return status ? status : DRAPE_E_MEMORY;
+    const int fd = drape_file_open(ctx, path);
+    if (fd >= 0)
+        status = drape_file_take(ctx, fd, path, SCENE_LIMIT, &text, &size);
+    else if (errno != ENOENT) /* a run that was killed has none */
+        status = DRAPE_E_FILE;
+    if (text)
+        source->summary = drape_json_read(text, size, 0, &error);
+    if (text && !source->summary && json_error_code(&error) == json_error_out_of_memory)
+        status = drape_fail_memory(ctx, size);
+    drape_free(ctx, text);
+    drape_free(ctx, path);
+    return status;
+}
+
+/* ---- The page ---- */
 
 static void begin_block(drape_file *file, const char *id)
 {
@@ -108,10 +147,13 @@ drape_status drape_report_write(drape_context *ctx, const drape_report_def *def,
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
                           sizeof result->path - 1);
     locale_t old = drape_locale_enter();
-    drape_status status = drape_report_source_open(ctx, def->run, &run);
+    drape_status status = read_run(ctx, def->run, &run);
     if (!status)
         status = write_page(&run, def, result, input);
-    drape_report_source_close(&run);
+    drape_record_close(&run.record);
+    json_decref(run.summary);
+    drape_model_destroy(&run.model);
+    drape_free(ctx, run.scene_text);
     drape_locale_leave(old);
     return status;
 }

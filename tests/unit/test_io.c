@@ -15,10 +15,10 @@
 
 #include "../support/suite.h"
 #include "drape/drape.h"
+#include "io/csv.h"
 #include "io/export.h"
 #include "io/recorder.h"
 #include "io/summary.h"
-#include "io/tables.h"
 #include "support/comma.h"
 
 /* Two cloths; frames of 1/40 s fall on and between the steps of 1/100 s. */
