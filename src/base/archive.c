@@ -79,33 +79,11 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
 
 /* ---- Reading ---- */
 
-static drape_status refuse_format(drape_archive *a, uint32_t format)
-{
-    return drape_archive_fail(a, DRAPE_E_VERSION,
-                              "the checkpoint has format %" PRIu32 "; this build reads format %d", format,
-                              FORMAT);
-}
-
-/* Checks magic, length, checksum and version of the format. */
-static drape_status check_whole(drape_archive *a, size_t size)
-{
-    uint64_t length, sum;
-    uint32_t format;
-    if (size < HEAD + TAIL || memcmp(a->from, MAGIC, MAGIC_SIZE) != 0)
-        return drape_archive_fail(a, DRAPE_E_PARSE, "it is not a Drape checkpoint");
-    memcpy(&format, a->from + MAGIC_SIZE, sizeof format);
-    memcpy(&length, a->from + size - TAIL, sizeof length);
-    memcpy(&sum, a->from + size - sizeof sum, sizeof sum);
-    if (format == OLD_FORMAT)
-        return refuse_format(a, format);
-    if (length != size - TAIL || drape_checksum_bytes(0, a->from, size - sizeof sum) != sum)
-        return drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is damaged: its checksum is wrong");
-    return format == FORMAT ? DRAPE_OK : refuse_format(a, format);
-}
-
 drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const char *name,
                                      const void *bytes, size_t size)
 {
+    uint64_t length, sum;
+    uint32_t format;
     a->ctx = ctx;
     a->name = name;
     a->reading = true;
@@ -114,8 +92,19 @@ drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const
     a->from = bytes;
     a->size = HEAD;
     a->end = 0;
-    if (!check_whole(a, size))
-        a->end = size - TAIL;
+    if (size < HEAD + TAIL || memcmp(a->from, MAGIC, MAGIC_SIZE) != 0)
+        return drape_archive_fail(a, DRAPE_E_PARSE, "it is not a Drape checkpoint");
+    memcpy(&format, a->from + MAGIC_SIZE, sizeof format);
+    memcpy(&length, a->from + size - TAIL, sizeof length);
+    memcpy(&sum, a->from + size - sizeof sum, sizeof sum);
+    const bool whole = length == size - TAIL && drape_checksum_bytes(0, a->from, size - sizeof sum) == sum;
+    if (format != OLD_FORMAT && !whole)
+        return drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is damaged: its checksum is wrong");
+    if (format != FORMAT)
+        return drape_archive_fail(a, DRAPE_E_VERSION,
+                                  "the checkpoint has format %" PRIu32 "; this build reads format %d", format,
+                                  FORMAT);
+    a->end = size - TAIL;
     return a->status;
 }
 
@@ -129,25 +118,21 @@ const unsigned char *drape_archive_next(drape_archive *a, size_t size)
     return a->from + a->size - size;
 }
 
-static void get(drape_archive *a, void *data, size_t size)
-{
-    const unsigned char *from = drape_archive_next(a, size);
-    if (from)
-        memcpy(data, from, size);
-    else
-        memset(data, 0, size);
-}
-
 /* ---- Parts ---- */
 
 void drape_archive_bytes(drape_archive *a, void *data, size_t size)
 {
     if (size == 0)
         return;
-    if (a->reading)
-        get(a, data, size);
-    else if (!a->status)
+    if (a->reading) {
+        const unsigned char *from = drape_archive_next(a, size);
+        if (from)
+            memcpy(data, from, size);
+        else
+            memset(data, 0, size);
+    } else if (!a->status) {
         put(a, data, size);
+    }
 }
 
 void drape_archive_align(drape_archive *a)
@@ -236,22 +221,18 @@ void drape_archive_same(drape_archive *a, const char *what, int64_t value)
 
 /* ---- End ---- */
 
-static void put_tail(drape_archive *a)
-{
-    const uint64_t length = a->size;
-    put(a, &length, sizeof length);
-    flush(a);
-    const uint64_t sum = a->sum.sum;
-    put(a, &sum, sizeof sum);
-    flush(a);
-}
-
 drape_status drape_archive_end(drape_archive *a)
 {
     drape_archive_mark(a, "end");
-    if (!a->reading)
-        put_tail(a);
-    else if (!a->status && a->size != a->end)
+    if (!a->reading) {
+        const uint64_t length = a->size;
+        put(a, &length, sizeof length);
+        flush(a);
+        const uint64_t sum = a->sum.sum;
+        put(a, &sum, sizeof sum);
+        flush(a);
+    } else if (!a->status && a->size != a->end) {
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is longer than expected");
+    }
     return a->status;
 }

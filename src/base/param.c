@@ -148,25 +148,21 @@ static const char *shown(double number, char text[SHOWN_SIZE])
 }
 #define SHOWN(number) shown(number, (char[SHOWN_SIZE]){0})
 
-static void choices_text(const drape_param *param, char *text, size_t size)
-{
-    size_t used = (size_t)snprintf(text, size, "one of: ");
-    for (int i = 0; param->choices[i] && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
-}
-
 void drape_param_range_text(const drape_param *param, char *text, size_t size)
 {
     const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
     const bool points = param->kind == DRAPE_PARAM_POINTS;
     const char *numbers = param->numbers ? param->numbers : points ? "[x, y]" : "[x, y, z]";
     char several[128] = "";
+    size_t used;
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
         snprintf(text, size, "true or false");
         return;
     case DRAPE_PARAM_CHOICE:
-        choices_text(param, text, size);
+        used = (size_t)snprintf(text, size, "one of: ");
+        for (int i = 0; param->choices[i] && used < size; i++)
+            used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
         return;
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "a non-empty string");
@@ -265,26 +261,11 @@ static bool in_range(const drape_param *param, double number)
 static drape_status number_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                  double number, double *value)
 {
-    bool good = false;
-    switch (param->kind) {
-    case DRAPE_PARAM_NUMBER:
-        good = in_range(param, number);
-        break;
-    case DRAPE_PARAM_INTEGER:
-        good = in_range(param, number) && number == floor(number);
-        break;
-    case DRAPE_PARAM_BOOLEAN:
-        good = number == 0 || number == 1;
-        break;
-    case DRAPE_PARAM_VECTOR:
-        good = in_range(param, number) && param->uniform;
-        break;
-    case DRAPE_PARAM_CHOICE:
-    case DRAPE_PARAM_TURN:
-    case DRAPE_PARAM_TEXT:
-    case DRAPE_PARAM_POINTS:
-        break;
-    }
+    const bool fits = in_range(param, number);
+    const bool good = param->kind == DRAPE_PARAM_BOOLEAN   ? number == 0 || number == 1
+                      : param->kind == DRAPE_PARAM_INTEGER ? fits && number == floor(number)
+                      : param->kind == DRAPE_PARAM_VECTOR  ? fits && param->uniform
+                                                           : fits && param->kind == DRAPE_PARAM_NUMBER;
     if (!good)
         return refuse_number(ctx, pointer, param, number);
     for (int k = 0; k < drape_param_width(param); k++)
@@ -370,23 +351,16 @@ static drape_status vector_value(drape_context *ctx, const char *pointer, const 
     return DRAPE_OK;
 }
 
-/* The choice that a former name stands for, which is logged; otherwise the text itself. */
-static const char *present_name(drape_context *ctx, const char *pointer, const drape_param *param,
-                                const char *text)
+static drape_status text_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                               const char *text, double *value)
 {
     for (const char *const *alias = param->aliases; alias && alias[0]; alias += 2)
         if (strcmp(alias[0], text) == 0) {
             drape_log(ctx, DRAPE_LOG_WARNING, "%s: \"%s\" is a former name; \"%s\" is used", pointer, text,
                       alias[1]);
-            return alias[1];
+            text = alias[1];
+            break;
         }
-    return text;
-}
-
-static drape_status text_value(drape_context *ctx, const char *pointer, const drape_param *param,
-                               const char *text, double *value)
-{
-    text = present_name(ctx, pointer, param, text);
     const bool yes = strcmp(text, "true") == 0, boolean = yes || strcmp(text, "false") == 0;
     char given[80], takes[RANGE_SIZE];
     size_t count = 0;
@@ -434,15 +408,6 @@ drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const 
                          list);
 }
 
-static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_entry *entry,
-                                 const char *name)
-{
-    const char *names[DRAPE_MAX_PARAMS];
-    for (int i = 0; i < entry->param_count; i++)
-        names[i] = entry->params[i].name;
-    return drape_param_unknown(ctx, pointer, name, names, (size_t)entry->param_count);
-}
-
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
 {
     char takes[RANGE_SIZE];
@@ -464,8 +429,12 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
         int i = drape_param_find(params, entry->param_count, settings[s].name);
         if (i < 0 && drape_retired(ctx, at, entry->name, settings[s].name))
             continue;
-        if (i < 0)
-            return unknown_name(ctx, at, entry, settings[s].name);
+        if (i < 0) {
+            const char *names[DRAPE_MAX_PARAMS];
+            for (int k = 0; k < entry->param_count; k++)
+                names[k] = params[k].name;
+            return drape_param_unknown(ctx, at, settings[s].name, names, (size_t)entry->param_count);
+        }
         drape_status status =
             drape_param_value(ctx, at, &params[i], &settings[s], values + drape_param_place(params, i));
         if (status)

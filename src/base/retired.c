@@ -3,64 +3,50 @@
 
 #include <string.h>
 
+#define MAX_NAMES 12
+
+/* NULL-ended, if they are fewer */
 static const struct {
-    const char *of, *name;
+    const char *of, *names[MAX_NAMES];
 } retired[] = {
     /* made up for what the nonlinear solver now does by itself */
-    {"integrator", "coarse_spacing"},
-    {"integrator", "correction_tolerance"},
-    {"integrator", "corrections"},
-    {"integrator", "extrapolation"},
-    {"integrator", "forcing"},
-    {"integrator", "linear_tolerance"},
-    {"integrator", "max_linear_iterations"},
-    {"integrator", "newton"},
-    {"integrator", "predictor"},
-    {"integrator", "project"},
-    {"integrator", "rescue_iterations"},
+    {"integrator",
+     {"coarse_spacing", "correction_tolerance", "corrections", "extrapolation", "forcing", "linear_tolerance",
+      "max_linear_iterations", "newton", "predictor", "project", "rescue_iterations"}},
     /* of methods that are gone */
-    {"integrator", "alpha"},
-    {"integrator", "beta"},
-    {"integrator", "family"},
-    {"integrator", "gamma"},
-    {"integrator", "rho_inf"},
-    {"integrator", "stability_detection"},
+    {"integrator", {"alpha", "beta", "family", "gamma", "rho_inf", "stability_detection"}},
     /* constants now, whose defaults served every scene */
-    {"integrator", "max_speed"},
-    {"integrator", "max_substeps"},
-    {"integrator", "safety"},
-    {"integrator", "strain_limit_tolerance"},
-    {"controller", "dt_max"},
-    {"controller", "every"},
-    {"controller", "least_iterations"},
-    {"controller", "max_attempts"},
-    {"controller", "max_substeps"},
-    {"controller", "most_iterations"},
-    {"controller", "safety"},
-    {"stretch.edge", "min_length"},
-    {"stretch.cst", "min_area"},
-    {"stretch.curve", "min_area"},
-    {"stretch.patch", "min_area"},
-    {"spring.structural", "min_length"},
-    {"spring.shear", "min_length"},
-    {"spring.bend", "min_length"},
-    {"limit.strain", "cap"},
-    {"limit.strain", "onset"},
-    {"bend.hinge", "min_altitude"},
-    {"bend.hinge", "max_turn"},
-    {"bend.midedge", "min_altitude"},
-    {"bend.midedge", "max_turn"},
-    {"animated_mesh", "distance"},
-    {"dashpot", "smoothing"},
-    {"contact", "restitution_velocity"},
-    {"untangle", "gap"},
-    {"untangle", "sweeps"},
+    {"integrator", {"max_speed", "max_substeps", "safety", "strain_limit_tolerance"}},
+    {"controller",
+     {"dt_max", "every", "least_iterations", "max_attempts", "max_substeps", "most_iterations", "safety"}},
+    {"stretch.edge", {"min_length"}},
+    {"stretch.cst", {"min_area"}},
+    {"stretch.curve", {"min_area"}},
+    {"stretch.patch", {"min_area"}},
+    {"spring.structural", {"min_length"}},
+    {"spring.shear", {"min_length"}},
+    {"spring.bend", {"min_length"}},
+    {"limit.strain", {"cap", "onset"}},
+    {"bend.hinge", {"min_altitude", "max_turn"}},
+    {"bend.midedge", {"min_altitude", "max_turn"}},
+    {"animated_mesh", {"distance"}},
+    {"dashpot", {"smoothing"}},
+    {"contact", {"restitution_velocity"}},
+    {"untangle", {"gap", "sweeps"}},
 };
+
+static bool has(size_t i, const char *name)
+{
+    for (int k = 0; k < MAX_NAMES && retired[i].names[k]; k++)
+        if (strcmp(retired[i].names[k], name) == 0)
+            return true;
+    return false;
+}
 
 bool drape_retired(drape_context *ctx, const char *pointer, const char *of, const char *name)
 {
     for (size_t i = 0; i < sizeof retired / sizeof *retired; i++)
-        if (strcmp(retired[i].of, of) == 0 && strcmp(retired[i].name, name) == 0) {
+        if (strcmp(retired[i].of, of) == 0 && has(i, name)) {
             if (ctx)
                 drape_log(ctx, DRAPE_LOG_WARNING, "%s: has no effect any more", pointer);
             return true;
@@ -84,7 +70,7 @@ static bool may_be_in(const char *pointer, const char *of)
 bool drape_is_retired(const char *pointer)
 {
     for (size_t i = 0; i < sizeof retired / sizeof *retired; i++)
-        if (strcmp(retired[i].name, strrchr(pointer, '/') + 1) == 0 && may_be_in(pointer, retired[i].of))
+        if (has(i, strrchr(pointer, '/') + 1) && may_be_in(pointer, retired[i].of))
             return true;
     return false;
 }

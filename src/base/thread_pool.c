@@ -84,40 +84,23 @@ static bool is_called(drape_pool *c)
     return atomic_load(&c->open) & LEFT || atomic_load(&c->ended);
 }
 
-static void await_call(drape_pool *c)
-{
-    for (int i = 0; i < HELPER_SPINS; i++) {
-        if (is_called(c))
-            return;
-        sched_yield();
-    }
-    pthread_mutex_lock(&c->lock);
-    atomic_fetch_add(&c->asleep, 1);
-    while (!is_called(c))
-        pthread_cond_wait(&c->work, &c->lock);
-    atomic_fetch_sub(&c->asleep, 1);
-    pthread_mutex_unlock(&c->lock);
-}
-
 static void *help(void *pool)
 {
     drape_pool *c = pool;
     while (!atomic_load(&c->ended)) {
-        await_call(c);
+        for (int i = 0; i < HELPER_SPINS && !is_called(c); i++)
+            sched_yield();
+        if (!is_called(c)) {
+            pthread_mutex_lock(&c->lock);
+            atomic_fetch_add(&c->asleep, 1);
+            while (!is_called(c))
+                pthread_cond_wait(&c->work, &c->lock);
+            atomic_fetch_sub(&c->asleep, 1);
+            pthread_mutex_unlock(&c->lock);
+        }
         run_tasks(c);
     }
     return NULL;
-}
-
-/* Helpers block all signals, which are for the host's threads. */
-static void start_helpers(drape_pool *c)
-{
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-    while (c->helpers < c->threads - 1 && !pthread_create(&c->helper[c->helpers], NULL, help, c))
-        c->helpers++;
-    pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
 drape_status drape_pool_create(drape_arena *arena, int threads, drape_pool **out)
@@ -134,7 +117,13 @@ drape_status drape_pool_create(drape_arena *arena, int threads, drape_pool **out
     pthread_mutex_init(&c->lock, NULL);
     pthread_cond_init(&c->work, NULL);
     pthread_cond_init(&c->done, NULL);
-    start_helpers(c);
+    /* Helpers block all signals, which are for the host's threads. */
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    while (c->helpers < c->threads - 1 && !pthread_create(&c->helper[c->helpers], NULL, help, c))
+        c->helpers++;
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
     *out = c;
     return DRAPE_OK;
 }
@@ -163,10 +152,17 @@ void drape_pool_destroy(drape_pool **pool)
 
 /* ---- The caller ---- */
 
-/* The loop is written before its tasks are opened. `open` and `asleep` are both sequentially consistent: a
- * helper that goes to sleep counts itself before it reads `open` for the last time. */
-static void call_helpers(drape_pool *c, int64_t tasks, drape_task *run, void *user)
+void drape_parallel(drape_pool *pool, int64_t tasks, drape_task *run, void *user)
 {
+    drape_pool *c = pool;
+    if (!c || c->helpers == 0 || tasks <= 1) {
+        for (int64_t k = 0; k < tasks; k++)
+            run(user, k);
+        return;
+    }
+    assert(tasks <= INT32_MAX);
+    /* The loop is written before its tasks are opened. `open` and `asleep` are both sequentially consistent:
+     * a helper that goes to sleep counts itself before it reads `open` for the last time. */
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;
     atomic_store_explicit(&c->run, run, memory_order_relaxed);
     atomic_store_explicit(&c->user, user, memory_order_relaxed);
@@ -175,32 +171,15 @@ static void call_helpers(drape_pool *c, int64_t tasks, drape_task *run, void *us
     atomic_store(&c->open, loop << 32 | (uint_fast64_t)tasks);
     if (atomic_load(&c->asleep))
         wake(c);
-}
-
-static void await_helpers(drape_pool *c)
-{
-    for (int i = 0; i < CALLER_SPINS; i++) {
-        if (!atomic_load(&c->unfinished))
-            return;
+    run_tasks(c);
+    for (int i = 0; i < CALLER_SPINS && atomic_load(&c->unfinished); i++)
         sched_yield();
-    }
+    if (!atomic_load(&c->unfinished))
+        return;
     pthread_mutex_lock(&c->lock);
     atomic_store(&c->waiting, true);
     while (atomic_load(&c->unfinished))
         pthread_cond_wait(&c->done, &c->lock);
     atomic_store(&c->waiting, false);
     pthread_mutex_unlock(&c->lock);
-}
-
-void drape_parallel(drape_pool *pool, int64_t tasks, drape_task *run, void *user)
-{
-    if (!pool || pool->helpers == 0 || tasks <= 1) {
-        for (int64_t k = 0; k < tasks; k++)
-            run(user, k);
-        return;
-    }
-    assert(tasks <= INT32_MAX);
-    call_helpers(pool, tasks, run, user);
-    run_tasks(pool);
-    await_helpers(pool);
 }

@@ -2,15 +2,18 @@
  * each value, in the order of the object. Lists are in one line, but those of objects with names. Empty lists
  * are left out. */
 #include "cli/cli.h"
-#include "cli/form.h"
+#include "cli/schema.h"
 
 #include "colliders/deformed.h"
 #include "compile/compile.h"
 #include "events/events.h"
 #include "io/json.h"
 #include "mesh/mesh.h"
+#include "model/model.h"
+#include "model/scene.h"
 #include "sim/profile.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -24,7 +27,209 @@ typedef struct info_request {
     bool json;
 } info_request;
 
-/* ---- As an object of described values (cli/form.h); what the scene does not model has no key ---- */
+/* ---- Parameters and keys, from their tables, so that every new key is shown; NULL: memory ran out ---- */
+
+/* A described value is an object with "value", "unit", "plain": true and, where it is known, "default"; plain
+ * JSON has the value alone in its place. Takes the reference to the value. */
+static json_t *described(json_t *value, const char *unit)
+{
+    return json_pack("{s:o, s:s, s:b}", "value", value, "unit", unit, "plain", true);
+}
+
+/* Or a parameter, which has no "plain". */
+static bool is_described(const json_t *value)
+{
+    return json_is_string(json_object_get(value, "unit"));
+}
+
+/* Replaces all described values inside an object or array. */
+static void make_plain(json_t *value)
+{
+    json_t *part;
+    size_t k;
+    for (void *i = json_object_iter(value); i; i = json_object_iter_next(value, i)) {
+        part = json_object_iter_value(i);
+        if (json_object_get(part, "plain"))
+            json_object_iter_set(value, i, json_object_get(part, "value"));
+        else
+            make_plain(part);
+    }
+    json_array_foreach(value, k, part) make_plain(part);
+}
+
+/* ---- Parameters ---- */
+
+/* The setting that the scene gave; NULL: none. */
+static const drape_setting *given(const drape_choice *choice, const char *name)
+{
+    for (size_t i = 0; choice && i < choice->setting_count; i++)
+        if (strcmp(choice->settings[i].name, name) == 0)
+            return &choice->settings[i];
+    return NULL;
+}
+
+/* Each parameter with "value", "unit" and "default". choice: what the scene said; NULL: not known, a value
+ * that equals the default counts as one, and texts are empty. */
+static json_t *params_json(const drape_param *params, int param_count, const double *values,
+                           const drape_choice *choice)
+{
+    json_t *object = json_object();
+    for (int p = 0; p < param_count; p++) {
+        const double *value = values + drape_param_place(params, p);
+        const drape_setting *setting = given(choice, params[p].name);
+        bool usual = !setting;
+        for (int k = 0; !choice && k < drape_param_width(&params[p]); k++)
+            usual = usual && (value[k] == params[p].default_value ||
+                              (isnan(value[k]) && isnan(params[p].default_value)));
+        json_t *one = json_pack("{s:o, s:s, s:b}", "value",
+                                cli_value_json(&params[p], value, setting ? setting->text : NULL), "unit",
+                                params[p].unit, "default", usual);
+        object = drape_json_with(object, params[p].name, one);
+    }
+    return object;
+}
+
+/* The parameters of an entry as described values. derived: also those that follow from others. */
+static json_t *values_json(const drape_entry *entry, const double *values, bool derived)
+{
+    json_t *object = params_json(entry->params, entry->param_count, values, NULL);
+    for (int p = 0; p < entry->param_count; p++) {
+        const char *name = entry->params[p].name;
+        if (derived || !isnan(values[drape_param_place(entry->params, p)]))
+            json_object_set_new(json_object_get(object, name), "plain", json_true());
+        else
+            json_object_del(object, name);
+    }
+    return object;
+}
+
+/* ---- Keys and objects ---- */
+
+static json_t *form_json(const drape_scene_object *form, const void *def);
+
+/* An element of the array of a key. */
+static json_t *element_json(const drape_scene_key *key, const void *element)
+{
+    const drape_track_key *track = element;
+    if (key->child)
+        return form_json(key->child, element);
+    if (key->shape == DRAPE_SCENE_TRACK)
+        return json_pack("[o, o]", drape_json_number(track->time),
+                         drape_json_numbers(track->displacement, 3));
+    if (key->param.kind == DRAPE_PARAM_TEXT)
+        return drape_json_text(*(const char *const *)element);
+    return key->param.kind == DRAPE_PARAM_NUMBER ? drape_json_number(*(const double *)element)
+                                                 : json_integer(*(const int32_t *)element);
+}
+
+static json_t *array_json(const drape_scene_key *key, const char *def)
+{
+    const size_t size = key->child                               ? key->child->def_size
+                        : key->shape == DRAPE_SCENE_TRACK        ? sizeof(drape_track_key)
+                        : key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t)
+                                                                 : sizeof(double);
+    const char *elements;
+    size_t count;
+    memcpy(&elements, def + key->offset, sizeof elements);
+    memcpy(&count, def + key->count_offset, sizeof count);
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = drape_json_append(array, element_json(key, elements + i * size));
+    return array;
+}
+
+/* NULL: none is given. */
+static json_t *key_json(const drape_scene_key *key, const char *def)
+{
+    const double *numbers = (const double *)(const void *)(def + key->offset);
+    drape_setting value;
+    switch (key->shape) {
+    case DRAPE_SCENE_VALUE:
+        if (!drape_scene_value(key, def, &value))
+            return NULL;
+        if (value.vector)
+            return drape_json_numbers(value.vector, value.vector_count);
+        return value.text ? drape_json_text(value.text) : cli_value_json(&key->param, &value.number, NULL);
+    case DRAPE_SCENE_LIST:
+    case DRAPE_SCENE_TRACK:
+    case DRAPE_SCENE_OBJECTS:
+    case DRAPE_SCENE_ENTRIES:
+        return array_json(key, def);
+    case DRAPE_SCENE_BOX:
+        return *(const bool *)(def + key->count_offset)
+                   ? json_pack("[o, o]", drape_json_numbers(numbers, 3), drape_json_numbers(numbers + 3, 3))
+                   : NULL;
+    case DRAPE_SCENE_QUATERNION:
+        return numbers[0] != 0 || numbers[1] != 0 || numbers[2] != 0 || numbers[3] != 0
+                   ? drape_json_numbers(numbers, 4)
+                   : NULL;
+    case DRAPE_SCENE_OBJECT:
+        return form_json(key->child, def + key->offset);
+    case DRAPE_SCENE_VERSION:
+    case DRAPE_SCENE_REMARK:
+        break;
+    }
+    return NULL;
+}
+
+/* Adds the keys that have a value, described and with "default", except names, which are shown where they are
+ * used, and children. */
+static json_t *with_keys(json_t *object, const drape_scene_object *form, const void *def)
+{
+    union {
+        drape_scene_def scene;
+        drape_cloth_def cloth;
+        drape_collider_def collider;
+        drape_event_def event;
+    } defaults = {.scene = {.struct_size = 0}};
+    assert(form->def_size <= sizeof defaults);
+    drape_scene_set_defaults(form, &defaults);
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
+        json_t *value = key->shape <= DRAPE_SCENE_LIST && !named ? key_json(key, def) : NULL;
+        if (!value)
+            continue;
+        json_t *usual = key_json(key, (const char *)&defaults);
+        json_t *same = json_boolean(json_equal(value, usual));
+        json_decref(usual);
+        value = drape_json_with(described(value, key->param.unit), "default", same);
+        object = drape_json_with(object, key->param.name, value);
+    }
+    return object;
+}
+
+/* An object of a scene with all values of its def, those by default included. */
+static json_t *form_json(const drape_scene_object *form, const void *def)
+{
+    json_t *object = json_object();
+    const char *turn = NULL;
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        json_t *value = key_json(key, def);
+        if (!value || (json_is_array(value) && json_array_size(value) == 0)) {
+            json_decref(value);
+            continue;
+        }
+        if (key->shape == DRAPE_SCENE_VALUE && key->param.kind != DRAPE_PARAM_TEXT)
+            value = described(value, key->param.unit);
+        object = drape_json_with(object, key->param.name, value);
+        turn = key->param.kind == DRAPE_PARAM_TURN ? key->param.name : turn;
+        if (turn && key->shape == DRAPE_SCENE_QUATERNION) /* it is in place of the axis and angle beside it */
+            json_object_del(object, turn);
+    }
+    return object;
+}
+
+static json_t *forms_json(const drape_scene_object *form, const void *defs, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = drape_json_append(array, form_json(form, (const char *)defs + i * form->def_size));
+    return array;
+}
+
+/* ---- The scene as an object of described values; what it does not model has no key ---- */
 
 typedef struct info {
     const cli_command *command;
@@ -43,7 +248,7 @@ static json_t *count(int64_t value)
 
 static json_t *number(double value, const char *unit)
 {
-    return cli_described(drape_json_number(value), unit);
+    return described(drape_json_number(value), unit);
 }
 
 /* Adds a list unless it is empty. */
@@ -73,7 +278,7 @@ static json_t *with_entry(json_t *object, const drape_entry *entry, const double
     object = drape_json_with(object, "type", json_string(entry->name));
     object = drape_json_with(object, "summary", json_string(entry->summary));
     return drape_json_with(object, "parameters",
-                           cli_params_json(entry->params, entry->param_count, values, choice));
+                           params_json(entry->params, entry->param_count, values, choice));
 }
 
 static json_t *named(const char *name)
@@ -102,13 +307,13 @@ static json_t *collider(const info *in, int32_t c)
     const drape_collider *from = &in->model->colliders[c];
     const drape_collider_def *def = &in->def.colliders[c];
     json_t *object = with_entry(named(from->name), &from->ops->entry, from->values, &from->choice);
-    object = cli_with_keys(object, &drape_form_collider, def);
-    json_t *moves = cli_form_json(&drape_form_collider, def);
+    object = with_keys(object, &drape_form_collider, def);
+    json_t *moves = form_json(&drape_form_collider, def);
     if (from->track.key_count > 0)
         object = drape_json_with(object, "track", json_incref(json_object_get(moves, "track")));
     if (from->turns.key_count > 0) {
         object = drape_json_with(object, "turns", json_incref(json_object_get(moves, "turns")));
-        object = drape_json_with(object, "pivot", cli_described(drape_json_numbers(from->pivot, 3), "m"));
+        object = drape_json_with(object, "pivot", described(drape_json_numbers(from->pivot, 3), "m"));
     }
     json_decref(moves);
     object = drape_json_with(object, "points", count(from->shape.point_count));
@@ -121,7 +326,7 @@ static json_t *event(const info *in, int32_t i)
 {
     const drape_model_event *from = &in->model->events[i];
     json_t *object = with_entry(named(from->name), &from->ops->entry, from->values, &from->choice);
-    object = cli_with_keys(object, &drape_form_event, &in->def.events[i]);
+    object = with_keys(object, &drape_form_event, &in->def.events[i]);
     return drape_json_with(object, "pinned_nodes", count(from->pinned_count));
 }
 
@@ -145,20 +350,20 @@ static json_t *with_contact(json_t *object, const info *in)
         drape_contact_values(&model->contact, values);
         object = drape_json_with(
             object, "contact",
-            cli_params_json(drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, values, &model->contact_choice));
+            params_json(drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, values, &model->contact_choice));
     }
     if (model->contact.self) {
         drape_self_contact_values(&model->contact, values);
         object = drape_json_with(object, "self_contact",
-                                 cli_params_json(drape_self_contact_params,
-                                                 forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
-                                                 values, &model->self_choice));
+                                 params_json(drape_self_contact_params,
+                                             forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                                             values, &model->self_choice));
     }
     if (model->untangle.given) {
         drape_untangle_values(&model->untangle, values);
-        object = drape_json_with(object, "untangle",
-                                 cli_params_json(drape_untangle_params, DRAPE_UNTANGLE_PARAM_COUNT, values,
-                                                 &model->untangle_choice));
+        object = drape_json_with(
+            object, "untangle",
+            params_json(drape_untangle_params, DRAPE_UNTANGLE_PARAM_COUNT, values, &model->untangle_choice));
     }
     return object;
 }
@@ -182,7 +387,7 @@ static json_t *pin(const info *in, const drape_pin *pin, const drape_pin_def *de
 {
     const drape_model *model = in->model;
     const int32_t first = pin->node_count > 0 ? pin->node[0] : -1;
-    json_t *object = cli_form_json(&drape_form_pin, def), *nodes = json_array(), *triangles = json_array();
+    json_t *object = form_json(&drape_form_pin, def), *nodes = json_array(), *triangles = json_array();
     for (int i = 0; object && drape_form_pin.one_of[i]; i++)
         json_object_del(object, drape_form_pin.one_of[i]);
     for (int32_t i = 0; i < pin->node_count; i++) {
@@ -199,7 +404,7 @@ static json_t *pin(const info *in, const drape_pin *pin, const drape_pin_def *de
         if (model->moved_node[i] == first && model->moved_track[i] >= 0)
             object = drape_json_with(
                 object, "pivot",
-                cli_described(drape_json_numbers(model->tracks[model->moved_track[i]].pivot, 3), "m"));
+                described(drape_json_numbers(model->tracks[model->moved_track[i]].pivot, 3), "m"));
     return object;
 }
 
@@ -221,7 +426,7 @@ static json_t *with_start(json_t *object, const drape_cloth_def *def)
     const drape_scene_object *form = drape_scene_key_of(&drape_form_cloth, "start")->child;
     drape_start_def defaults = {.file = NULL};
     drape_scene_set_defaults(form, &defaults);
-    json_t *start = cli_form_json(form, &def->start), *rest = cli_form_json(form, &defaults);
+    json_t *start = form_json(form, &def->start), *rest = form_json(form, &defaults);
     if (!json_equal(start, rest))
         object = drape_json_with(object, "start", json_incref(start));
     json_decref(start);
@@ -238,7 +443,7 @@ static const drape_grid_ops *grid(const info *in, const drape_entry_def *def, js
     const drape_entry *entry = i < 0 ? NULL : &drape_grids[i]->entry;
     if (!entry || drape_params_resolve(in->sim->ctx, "", entry, def->settings, def->setting_count, values))
         entry = NULL;
-    *object = entry ? cli_values_json(entry, values, in->derived) : json_object();
+    *object = entry ? values_json(entry, values, in->derived) : json_object();
     return entry ? drape_grids[i] : NULL;
 }
 
@@ -250,14 +455,14 @@ static json_t *mesh(const info *in, const drape_cloth *cloth, const drape_mesh_d
         object = drape_json_with(object, "grid", drape_json_text(from->entry.name));
     if (cloth->file)
         object = drape_json_with(object, "file", drape_json_text(cloth->file));
-    return drape_json_with(object, "transform", cli_with_keys(json_object(), &drape_form_transform, def));
+    return drape_json_with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
 }
 
 static json_t *render_mesh(const info *in, int32_t c)
 {
     const drape_cloth *cloth = &in->model->cloths[c];
     const drape_render_mesh_def *def = &in->def.cloths[c].render_mesh;
-    json_t *object, *keys = cli_form_json(drape_scene_key_of(&drape_form_cloth, "render_mesh")->child, def);
+    json_t *object, *keys = form_json(drape_scene_key_of(&drape_form_cloth, "render_mesh")->child, def);
     grid(in, &def->mesh.grid, &object);
     json_object_update(object, keys);
     json_decref(keys);
@@ -281,7 +486,7 @@ static json_t *with_woven(json_t *object, const char *key, const drape_woven *w,
 static json_t *material(const info *in, const drape_cloth *cloth)
 {
     const drape_material *m = &cloth->material;
-    json_t *object = cli_values_json(&drape_material_entry, cloth->material_values, in->derived);
+    json_t *object = values_json(&drape_material_entry, cloth->material_values, in->derived);
     object = drape_json_with(object, "areal_density", number(m->areal_density, "kg/m2"));
     object = drape_json_with(object, "membrane_stiffness", number(m->membrane_stiffness, "N/m"));
     object = drape_json_with(object, "flexural_rigidity", number(m->flexural_rigidity, "N m"));
@@ -312,14 +517,14 @@ static json_t *cloth(const info *in, int32_t c)
     object = drape_json_with(object, "mesh", mesh(in, from, &def->mesh));
     object = drape_json_with(object, "mass", number(mass, "kg"));
     object = drape_json_with(object, "area", number(area, "m2"));
-    object = cli_with_keys(object, &drape_form_cloth, def);
+    object = with_keys(object, &drape_form_cloth, def);
     object = drape_json_with(object, "pinned", count(pinned));
     object = drape_json_with(object, "moved", count(moved));
     object = drape_json_with(object, "supported", count(supported));
     object = with_list(object, "pins", pins(in, c));
-    object = with_list(object, "masses", cli_forms_json(&drape_form_mass, def->masses, def->mass_count));
-    object = with_list(object, "periodic",
-                       cli_forms_json(&drape_form_periodic, def->periodic, def->periodic_count));
+    object = with_list(object, "masses", forms_json(&drape_form_mass, def->masses, def->mass_count));
+    object =
+        with_list(object, "periodic", forms_json(&drape_form_periodic, def->periodic, def->periodic_count));
     object = with_start(object, def);
     if (from->bound)
         object = drape_json_with(object, "render_mesh", render_mesh(in, c));
@@ -347,7 +552,7 @@ static json_t *term(const info *in, int32_t i)
     object = drape_json_with(object, "share",
                              drape_json_number(seconds / fmax(drape_profile_seconds(&in->profile), 1e-300)));
     json_t *parameters =
-        cli_params_json(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
+        params_json(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
     if (from->history && *from->history->name)
         json_object_set_new(json_object_get(parameters, "history"), "value",
                             drape_json_text(from->history->name));
@@ -418,8 +623,8 @@ static json_t *scene(const info *in)
     const double intervals = model->duration * model->frame_rate, whole = floor(intervals + 1e-9);
     const int64_t frames = (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
     json_t *object = drape_json_with(json_object(), "scene", drape_json_text(in->command->operand));
-    object = cli_with_keys(object, &drape_form_scene, &in->def);
-    object = cli_with_keys(object, &drape_form_output, &in->def);
+    object = with_keys(object, &drape_form_scene, &in->def);
+    object = with_keys(object, &drape_form_output, &in->def);
     object = drape_json_with(object, "frames", count(frames));
     object = drape_json_with(object, "nodes", count(model->node_count));
     object = drape_json_with(object, "free", count(model->free_count));
@@ -432,7 +637,7 @@ static json_t *scene(const info *in)
     object = with_list(object, "events", list_of(in, (size_t)model->event_count, event));
     object = drape_json_with(object, "seams", list_of(in, (size_t)model->seam_count, seam));
     object = with_list(object, "histories",
-                       cli_forms_json(&drape_form_history, in->def.histories, in->def.history_count));
+                       forms_json(&drape_form_history, in->def.histories, in->def.history_count));
     object = drape_json_with(object, "integrator",
                              chosen(in, &all->integrator->entry, all->integrator_values, &model->integrator,
                                     drape_chosen_ignores_integrator));
@@ -486,7 +691,7 @@ static void add_value(line *to, json_t *value)
     const char *key, *unit = json_string_value(json_object_get(value, "unit")), *separator = "";
     json_t *part = json_object_get(value, "value");
     size_t i;
-    if (cli_is_described(value)) {
+    if (is_described(value)) {
         add_value(to, part);
         if (strcmp(unit, "1") != 0 && (json_is_number(part) || json_is_array(part)))
             add(to, " %s", unit);
@@ -567,11 +772,11 @@ static void print_object(int indent, json_t *object)
         line to = {.length = 0};
         if (strcmp(key, "parameters") == 0) {
             print_object(indent, value);
-        } else if ((json_is_object(value) && !cli_is_described(value)) ||
+        } else if ((json_is_object(value) && !is_described(value)) ||
                    json_is_string(json_object_get(json_array_get(value, 0), "name"))) {
             fputs(indent ? "" : "\n", stdout);
             print_block(indent, key, value);
-        } else if ((strcmp(key, "name") != 0 || cli_is_described(value)) &&
+        } else if ((strcmp(key, "name") != 0 || is_described(value)) &&
                    (!json_is_array(value) || json_array_size(value) > 0)) {
             add_value(&to, value);
             printf("%*s%-*s %s%s\n", indent, "", COLUMN - indent, key, CLI_SHOWN(to.text),
@@ -591,7 +796,7 @@ static int run(const void *command)
     if (loaded && make_info(common, &in, !request->json, &object)) {
         code = cli_report(common, CLI_FAILED);
     } else if (loaded && request->json) {
-        cli_make_plain(object);
+        make_plain(object);
         code = cli_print_json(common, object, JSON_INDENT(2) | JSON_REAL_PRECISION(15) | JSON_ENSURE_ASCII);
     } else if (loaded) {
         code = object && !drape_memory_ran_out() ? CLI_DONE : cli_report_memory(common);

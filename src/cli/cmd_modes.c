@@ -52,11 +52,8 @@ static drape_status write_table(const job *j, drape_folder *folder)
         const drape_mode *mode = &j->modes.modes[k];
         drape_file_print(&file, "%d", (int)k + 1);
         drape_csv_put_text(&file, kinds[mode->kind]);
-        drape_csv_put_number(&file, mode->value);
-        drape_csv_put_number(&file, mode->frequency);
-        drape_csv_put_number(&file, mode->mass);
-        drape_csv_put_number(&file, mode->residual);
-        drape_csv_put_number(&file, mode->error);
+        drape_csv_put_numbers(
+            &file, 5, (double[]){mode->value, mode->frequency, mode->mass, mode->residual, mode->error});
         drape_csv_put_integer(&file, (int64_t)k * frames_of(j->request));
         drape_file_put_text(&file, "\n");
     }
@@ -194,19 +191,17 @@ static int run(const void *command)
     return code;
 }
 
+#define AT(member) offsetof(modes_request, member)
 static const cli_option options[] = {
-    {"count", CLI_NUMBER, "N", "number of modes (default 6)", offsetof(modes_request, count), 100000},
-    {"state", CLI_TEXT, "STATE", CLI_STATES " (default static)", offsetof(modes_request, state)},
-    {"buckling", CLI_FLAG, NULL, "factors of the scene's loads at which the cloth buckles",
-     offsetof(modes_request, buckling)},
+    {"count", CLI_NUMBER, "N", "number of modes (default 6)", AT(count), 100000},
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default static)", AT(state)},
+    {"buckling", CLI_FLAG, NULL, "factors of the scene's loads at which the cloth buckles", AT(buckling)},
     {"out", CLI_TEXT, "DIR",
-     "folder for modes.csv, scene.json and frames of each mode; drape render draws it",
-     offsetof(modes_request, out)},
-    {"frames", CLI_NUMBER, "N", "frames of each mode, over one period (default 60)",
-     offsetof(modes_request, frames), 100000},
+     "folder for modes.csv, scene.json and frames of each mode; drape render draws it", AT(out)},
+    {"frames", CLI_NUMBER, "N", "frames of each mode, over one period (default 60)", AT(frames), 100000},
     {"amplitude", CLI_REAL, "METRES", "largest displacement in a frame (default: a twentieth of the scene)",
-     offsetof(modes_request, amplitude)},
-    {"json", CLI_FLAG, NULL, "print JSON", offsetof(modes_request, json)},
+     AT(amplitude)},
+    {"json", CLI_FLAG, NULL, "print JSON", AT(json)},
 };
 
 const drape_verb drape_verb_modes = {

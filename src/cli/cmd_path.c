@@ -55,14 +55,10 @@ static drape_status write_row(job *j, const drape_path_point *point)
     drape_file *file = &j->table;
     drape_file_print(file, "%" PRId64, point->number);
     drape_csv_put_text(file, events[point->event]);
-    drape_csv_put_number(file, point->factor);
-    drape_csv_put_number(file, point->arc);
-    drape_csv_put_number(file, point->elastic);
-    drape_csv_put_number(file, point->potential);
+    drape_csv_put_numbers(file, 4, (double[]){point->factor, point->arc, point->elastic, point->potential});
     drape_csv_put_integer(file, point->unstable);
     drape_csv_put_integer(file, point->iterations);
-    drape_csv_put_number(file, point->residual);
-    drape_csv_put_number(file, largest_displacement(m, x));
+    drape_csv_put_numbers(file, 2, (double[]){point->residual, largest_displacement(m, x)});
     for (size_t i = 0; i < j->request->nodes.count; i++)
         for (size_t k = 0; k < 3; k++)
             drape_csv_put_number(file, x[3 * (size_t)j->node[i] + k] - m->rest[3 * (size_t)j->node[i] + k]);
@@ -198,27 +194,21 @@ static int run(const void *command)
     return code;
 }
 
+#define AT(member) offsetof(path_request, member)
 static const cli_option options[] = {
-    {"state", CLI_TEXT, "STATE", CLI_STATES " (default start)", offsetof(path_request, state)},
+    {"state", CLI_TEXT, "STATE", CLI_STATES " (default start)", AT(state)},
     {"from", CLI_TEXT, "FACTOR", "factor of the loads at the first point (default 0 from the start, else 1)",
-     offsetof(path_request, from)},
-    {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1 from the start, else 2)",
-     offsetof(path_request, to)},
-    {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)",
-     offsetof(path_request, step)},
+     AT(from)},
+    {"to", CLI_TEXT, "FACTOR", "factor at which the path ends (default 1 from the start, else 2)", AT(to)},
+    {"step", CLI_REAL, "FACTOR", "first increment of the factor (default: a twentieth of all)", AT(step)},
     {"max-arc", CLI_REAL, "METRES",
-     "longest step along the path, RMS of the nodes (default: a fiftieth of the scene)",
-     offsetof(path_request, max_arc)},
-    {"points", CLI_NUMBER, "N", "points after which the path ends (default 200)",
-     offsetof(path_request, points), 1000000},
+     "longest step along the path, RMS of the nodes (default: a fiftieth of the scene)", AT(max_arc)},
+    {"points", CLI_NUMBER, "N", "points after which the path ends (default 200)", AT(points), 1000000},
     {"load-control", CLI_FLAG, NULL, "steps of the factor, not of the arc: no limit point is passed",
-     offsetof(path_request, load_control)},
-    {"branch", CLI_TEXT, "+|-", "at the first bifurcation, follow the branch to this side",
-     offsetof(path_request, branch)},
-    {"node", CLI_TEXTS, "N", "columns with the displacement of this node; may be repeated",
-     offsetof(path_request, nodes)},
-    {"out", CLI_TEXT, "DIR", "folder for path.csv, scene.json and a frame of each point",
-     offsetof(path_request, out)},
+     AT(load_control)},
+    {"branch", CLI_TEXT, "+|-", "at the first bifurcation, follow the branch to this side", AT(branch)},
+    {"node", CLI_TEXTS, "N", "columns with the displacement of this node; may be repeated", AT(nodes)},
+    {"out", CLI_TEXT, "DIR", "folder for path.csv, scene.json and a frame of each point", AT(out)},
 };
 
 const drape_verb drape_verb_path = {

@@ -14,12 +14,12 @@ typedef struct report_request {
     int megabytes; /* 0: not given */
 } report_request;
 
+#define AT(member) offsetof(report_request, member)
 static const cli_option options[] = {
-    {"out", CLI_TEXT, "FILE", "the page; default report.html in the folder of the run",
-     offsetof(report_request, out)},
+    {"out", CLI_TEXT, "FILE", "the page; default report.html in the folder of the run", AT(out)},
     {"megabytes", CLI_NUMBER, "N",
      "room for frames in the page (default 48); if they need more, some are left out at equal intervals",
-     offsetof(report_request, megabytes), MAX_MEGABYTES},
+     AT(megabytes), MAX_MEGABYTES},
 };
 
 static int run(const void *command)

@@ -508,21 +508,21 @@ static int run_on_ranks(const void *command)
     return code == CLI_GO_ON ? cli_ranks_end(load_and_run(request)) : code;
 }
 
+#define AT(member) offsetof(run_request, member)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
-     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; created if necessary",
-     offsetof(run_request, out)},
-    {"summary", CLI_TEXT, "FILE", "write the summary to this file too", offsetof(run_request, summary)},
+     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; created if necessary", AT(out)},
+    {"summary", CLI_TEXT, "FILE", "write the summary to this file too", AT(summary)},
     {"checkpoint-every", CLI_NUMBER, "N", "save the run in DIR/checkpoint.drape with every N-th frame",
-     offsetof(run_request, checkpoint_every), INT_MAX},
+     AT(checkpoint_every), INT_MAX},
     {"resume", CLI_FLAG, NULL,
      "resume from the checkpoint in DIR, of the same scene; without one, start from the beginning",
-     offsetof(run_request, resume)},
+     AT(resume)},
     {"realtime", CLI_FLAG, NULL,
      "give each frame its duration, 1/frame_rate, as time budget, by newton_k unless a method is named; "
      "report how "
      "long frames took",
-     offsetof(run_request, realtime)},
+     AT(realtime)},
 };
 
 const drape_verb drape_verb_run = {

@@ -240,13 +240,13 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     return code;
 }
 
+#define AT(member) offsetof(validate_request, member)
 static const cli_option options[] = {
-    {"json", CLI_FLAG, NULL, "print one array, an object for each case", offsetof(validate_request, json)},
-    {"markdown", CLI_FLAG, NULL, "print a Markdown table", offsetof(validate_request, markdown)},
+    {"json", CLI_FLAG, NULL, "print one array, an object for each case", AT(json)},
+    {"markdown", CLI_FLAG, NULL, "print a Markdown table", AT(markdown)},
     {"out", CLI_TEXT, "DIR", "save a line of JSON for each case; the same command resumes where it stopped",
-     offsetof(validate_request, out)},
-    {"scenes", CLI_TEXT, "DIR", "only write the scene of every case into DIR",
-     offsetof(validate_request, scenes)},
+     AT(out)},
+    {"scenes", CLI_TEXT, "DIR", "only write the scene of every case into DIR", AT(scenes)},
 };
 
 static int main_validate(const void *command)

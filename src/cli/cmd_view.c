@@ -539,11 +539,12 @@ static int run(const void *command)
     return code;
 }
 
+#define AT(member) offsetof(view_request, member)
 static const cli_option options[] = {
     {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default linen); `drape list shadings` shows all",
-     offsetof(view_request, shade)},
-    {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size)},
-    {"running", CLI_FLAG, NULL, "start running, not paused", offsetof(view_request, running)},
+     AT(shade)},
+    {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", AT(size)},
+    {"running", CLI_FLAG, NULL, "start running, not paused", AT(running)},
 };
 
 const drape_verb drape_verb_view = {

@@ -4,7 +4,6 @@
  * collider depend on each other, and all rules that depend on a mesh.
  */
 #include "cli/schema.h"
-#include "cli/form.h"
 
 #include "colliders/colliders.h"
 #include "compile/compile.h"
@@ -71,6 +70,29 @@ static json_t *exactly_one(json_t *object, const char *const *names)
 static json_t *number(double value)
 {
     return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
+}
+
+json_t *cli_value_json(const drape_param *param, const double *value, const char *text)
+{
+    if (isnan(*value) && param->derived)
+        return json_string(param->derived);
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        return json_boolean(*value != 0);
+    case DRAPE_PARAM_CHOICE:
+        return json_string(param->choices[(int)*value]);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        return drape_json_numbers(value, 3);
+    case DRAPE_PARAM_TEXT:
+        return drape_json_text(text ? text : "");
+    case DRAPE_PARAM_INTEGER:
+    case DRAPE_PARAM_POINTS: /* their number */
+        return json_integer((json_int_t)*value);
+    case DRAPE_PARAM_NUMBER:
+        break;
+    }
+    return drape_json_number(*value);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)

@@ -27,18 +27,6 @@ drape_status drape_event_check_node(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* The nodes of the event's cloths: [first, end). */
-static void range_of(const drape_event_point *p, int32_t *first, int32_t *end)
-{
-    *first = 0;
-    *end = p->model->node_count;
-    if (p->event->cloth < 0)
-        return;
-    const drape_cloth *cloth = &p->model->cloths[p->event->cloth];
-    *first = cloth->first_node;
-    *end = *first + cloth->mesh.node_count;
-}
-
 static double center(const drape_event_point *p, const double direction[3], int32_t first, int32_t end)
 {
     double sum = 0, mass = 0;
@@ -53,8 +41,9 @@ double drape_event_position(const drape_event_point *p, const double direction[3
 {
     const double node = p->event->values[DRAPE_EVENT_NODE];
     const int of = (int)p->event->values[DRAPE_EVENT_OF];
-    int32_t first, end;
-    range_of(p, &first, &end);
+    const drape_cloth *cloth = p->event->cloth < 0 ? NULL : &p->model->cloths[p->event->cloth];
+    const int32_t first = cloth ? cloth->first_node : 0,
+                  end = cloth ? first + cloth->mesh.node_count : p->model->node_count;
     if (!isnan(node))
         return vec3_dot(direction, p->x + 3 * ((size_t)first + (size_t)node));
     if (of == CENTER)

@@ -4,12 +4,8 @@
 
 #include <string.h>
 
-static drape_status measure(drape_sim *sim, const double *x, double *values)
+void drape_field_node_strain(const drape_model *m, const double *x, double *strain, double *values)
 {
-    const drape_model *m = sim->model;
-    double *strain = drape_alloc(sim->ctx, 2 * (size_t)m->triangle_count, sizeof *strain);
-    if (!strain)
-        return DRAPE_E_MEMORY;
     drape_model_strain(m, x, strain);
     memset(values, 0, (size_t)m->node_count * sizeof *values);
     for (int32_t c = 0; c < m->cloth_count; c++) {
@@ -22,6 +18,14 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
         for (int32_t i = 0; i < cloth->mesh.node_count; i++)
             values[cloth->first_node + i] /= cloth->mesh.node_area[i];
     }
+}
+
+static drape_status measure(drape_sim *sim, const double *x, double *values)
+{
+    double *strain = drape_alloc(sim->ctx, 2 * (size_t)sim->model->triangle_count, sizeof *strain);
+    if (!strain)
+        return DRAPE_E_MEMORY;
+    drape_field_node_strain(sim->model, x, strain, values);
     drape_free(sim->ctx, strain);
     return DRAPE_OK;
 }

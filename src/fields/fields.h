@@ -22,4 +22,7 @@ typedef struct drape_field_ops {
 extern const drape_field_ops *const drape_fields[]; /* NULL-ended */
 extern const drape_registry drape_field_registry;
 
+/* The field `strain` at positions x; strain (triangle_count x 2): workspace. */
+void drape_field_node_strain(const drape_model *model, const double *x, double *strain, double *values);
+
 #endif

@@ -28,6 +28,12 @@ void drape_csv_put_number(drape_file *file, double value)
         drape_file_print(file, ",%.17g", value);
 }
 
+void drape_csv_put_numbers(drape_file *file, size_t count, const double *values)
+{
+    for (size_t i = 0; i < count; i++)
+        drape_csv_put_number(file, values[i]);
+}
+
 void drape_csv_put_quoted(drape_file *file, const char *text)
 {
     for (; *text; text++)
@@ -67,12 +73,9 @@ const char drape_energy_columns[] =
 
 static void put_energy(drape_file *file, const drape_energy *energy)
 {
-    drape_csv_put_number(file, energy->kinetic);
-    drape_csv_put_number(file, energy->elastic);
-    drape_csv_put_number(file, energy->gravity);
-    drape_csv_put_number(file, energy->contact);
-    drape_csv_put_number(file, energy->dissipated);
-    drape_csv_put_number(file, energy->numerical);
+    const double parts[] = {energy->kinetic, energy->elastic,    energy->gravity,
+                            energy->contact, energy->dissipated, energy->numerical};
+    drape_csv_put_numbers(file, 6, parts);
 }
 
 /* "heavy@0.12126511814700001;down@0.239389200361": the events that are reported after the attempt. */
@@ -97,14 +100,12 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     const drape_diagnostic *worst = &attempt->diagnostic;
     const char *what = worst->what;
     drape_file_print(file, "%" PRId64, attempt->index);
-    drape_csv_put_number(file, attempt->t);
-    drape_csv_put_number(file, attempt->h);
+    drape_csv_put_numbers(file, 2, (double[]){attempt->t, attempt->h});
     drape_csv_put_integer(file, attempt->accepted);
     drape_csv_put_text(file, drape_status_name(attempt->status));
     drape_csv_put_text(file, attempt->reason);
     drape_csv_put_integer(file, attempt->iterations);
-    drape_csv_put_number(file, attempt->residual);
-    drape_csv_put_number(file, attempt->tolerance);
+    drape_csv_put_numbers(file, 2, (double[]){attempt->residual, attempt->tolerance});
     put_energy(file, energy);
     if (what && *what) {
         drape_csv_put_text(file, what);
@@ -116,13 +117,11 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
         drape_file_put_text(file, ",");
         for (int i = 0; i < 4 && worst->node[i] >= 0; i++)
             drape_file_print(file, "%s%" PRId32, i ? " " : "", worst->node[i]);
-        drape_csv_put_number(file, worst->value);
-        drape_csv_put_number(file, worst->limit);
+        drape_csv_put_numbers(file, 2, (double[]){worst->value, worst->limit});
     } else {
         drape_file_put_text(file, ",,,,,,");
     }
-    drape_csv_put_number(file, attempt->error);
-    drape_csv_put_number(file, attempt->left);
+    drape_csv_put_numbers(file, 2, (double[]){attempt->error, attempt->left});
     put_events(file, events);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
@@ -132,8 +131,7 @@ drape_status drape_energy_write(drape_file *file, int64_t frame, double t, doubl
                                 const drape_energy *energy)
 {
     drape_file_print(file, "%" PRId64, frame);
-    drape_csv_put_number(file, t);
-    drape_csv_put_number(file, t_state);
+    drape_csv_put_numbers(file, 2, (double[]){t, t_state});
     put_energy(file, energy);
     drape_csv_put_number(file, energy->kinetic + energy->elastic + energy->gravity + energy->contact);
     drape_file_put_text(file, "\n");

@@ -11,6 +11,7 @@
 void drape_csv_put_integer(drape_file *file, int64_t value);
 /* With 17 digits, in the locale of the thread. */
 void drape_csv_put_number(drape_file *file, double value);
+void drape_csv_put_numbers(drape_file *file, size_t count, const double *values);
 /* In quotes if necessary; NULL is an empty field. */
 void drape_csv_put_text(drape_file *file, const char *text);
 

@@ -42,7 +42,6 @@ typedef struct drape_report_data {
     double *x;                          /* (node_count x 3) positions in the loaded frame */
     double *before, *after;             /* (node_count x 3) positions in its neighbours */
     double *strain;                     /* (triangle_count x 2) */
-    double *weight;                     /* (node_count) a third of the area of the triangles around [m2] */
     double *node_strain, *speed;        /* (node_count) */
     double *normals;                    /* (node_count x 3); NULL, as the next: no cloth has a render mesh */
     double *shown[DRAPE_REPORT_FIELDS]; /* the fields of the loaded frame at the nodes of the surface */

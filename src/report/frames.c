@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/vec3.h"
+#include "fields/fields.h"
 #include "model/deformation.h"
 #include "report/data.h"
 
@@ -12,72 +13,40 @@
 
 /* ---- Fields of one frame ---- */
 
-/* At each node the mean of the larger principal strain of the triangles around it, weighted by their rest
- * areas. */
-static void find_strain(const drape_report_data *d)
-{
-    const drape_model *model = d->run->model;
-    drape_model_strain(model, d->x, d->strain);
-    memset(d->node_strain, 0, (size_t)model->node_count * sizeof *d->node_strain);
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const drape_cloth *cloth = &model->cloths[c];
-        for (int32_t i = 0; i < cloth->mesh.triangle_count; i++) {
-            size_t t = (size_t)(cloth->first_triangle + i);
-            for (int k = 0; k < 3; k++)
-                d->node_strain[model->triangle[3 * t + (size_t)k]] +=
-                    d->strain[2 * t] * cloth->mesh.triangle_area[i] / 3;
-        }
-    }
-    for (int32_t i = 0; i < model->node_count; i++)
-        d->node_strain[i] /= d->weight[i];
-}
-
-/* Speeds by central differences of positions; one-sided at the ends of the run. */
-static drape_status find_speed(const drape_report_data *d, int64_t frame)
-{
-    const drape_report_source *run = d->run;
-    int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < run->record.frames ? frame + 1 : frame;
-    double h = run->record.times[after] - run->record.times[before];
-    drape_status status = drape_record_read(&run->record, before, d->before);
-    if (!status)
-        status = drape_record_read(&run->record, after, d->after);
-    for (int32_t i = 0; !status && i < run->model->node_count; i++) {
-        double difference[3];
-        vec3_sub(d->after + 3 * (size_t)i, d->before + 3 * (size_t)i, difference);
-        d->speed[i] = h > 0 ? vec3_norm(difference) / h : 0;
-    }
-    return status;
-}
-
 static const double *values_of(const drape_report_data *d, int field)
 {
     return d->shown[field] ? d->shown[field] : field == 0 ? d->x : field == 1 ? d->node_strain : d->speed;
 }
 
-/* The fields of the loaded frame where render meshes are. */
-static void show(const drape_report_data *d)
+static drape_status load(const drape_report_data *d, int64_t frame)
 {
     const drape_model *model = d->run->model;
+    const drape_record *record = &d->run->record;
+    const int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < record->frames ? frame + 1 : frame;
+    const double h = record->times[after] - record->times[before];
+    drape_status status = drape_check_cancel(d->run->ctx);
+    if (!status)
+        status = drape_record_read(record, frame, d->x);
+    if (!status)
+        status = drape_record_read(record, before, d->before);
+    if (!status)
+        status = drape_record_read(record, after, d->after);
+    if (status)
+        return status;
+    drape_field_node_strain(model, d->x, d->strain, d->node_strain);
+    /* speeds by central differences of positions; one-sided at the ends of the run */
+    for (int32_t i = 0; i < model->node_count; i++) {
+        double difference[3];
+        vec3_sub(d->after + 3 * (size_t)i, d->before + 3 * (size_t)i, difference);
+        d->speed[i] = h > 0 ? vec3_norm(difference) / h : 0;
+    }
     if (!model->surface.bound)
-        return;
+        return DRAPE_OK;
     drape_model_normals(model, d->x, d->normals);
     drape_render_positions(model, -1, d->x, d->normals, d->shown[0]);
     drape_render_values(model, d->node_strain, 1, d->shown[1]);
     drape_render_values(model, d->speed, 1, d->shown[2]);
-}
-
-static drape_status load(const drape_report_data *d, int64_t frame)
-{
-    drape_status status = drape_check_cancel(d->run->ctx);
-    if (!status)
-        status = drape_record_read(&d->run->record, frame, d->x);
-    if (status)
-        return status;
-    find_strain(d);
-    status = find_speed(d, frame);
-    if (!status)
-        show(d);
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Colliders that deform ---- */
@@ -142,40 +111,24 @@ static void extend_range(drape_report_field *field, const double *values, size_t
     }
 }
 
-static void begin_range(drape_report_field *field, double high[3])
-{
-    for (int k = 0; k < 3; k++) {
-        field->low[k] = DBL_MAX;
-        high[k] = -DBL_MAX;
-    }
-}
-
 static void end_range(drape_report_field *field, const double high[3])
 {
     for (int k = 0; k < field->width; k++)
         field->step[k] = (high[k] - field->low[k]) / LEVELS;
 }
 
-static void find_body_ranges(drape_report_data *d)
-{
-    for (int32_t b = 0; b < d->body_count; b++) {
-        double high[3];
-        begin_range(&d->bodies[b].field, high);
-        for (int64_t k = 0; k < d->kept; k++)
-            extend_range(&d->bodies[b].field, d->points, load_body(d, b, d->frame[k]), high);
-        end_range(&d->bodies[b].field, high);
-    }
-}
-
 static drape_status find_ranges(drape_report_data *d)
 {
     static const drape_report_field fields[DRAPE_REPORT_FIELDS] = {
         {"positions", "m", 3, {0}, {0}}, {"strain", "1", 1, {0}, {0}}, {"speed", "m/s", 1, {0}, {0}}};
+    static const double lowest[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, highest[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
     double high[DRAPE_REPORT_FIELDS][3];
     size_t nodes = (size_t)d->run->model->surface.node_count;
     memcpy(d->fields, fields, sizeof fields);
-    for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
-        begin_range(&d->fields[f], high[f]);
+    for (int f = 0; f < DRAPE_REPORT_FIELDS; f++) {
+        memcpy(d->fields[f].low, lowest, sizeof lowest);
+        memcpy(high[f], highest, sizeof highest);
+    }
     for (int64_t k = 0; k < d->kept; k++) {
         drape_status status = load(d, d->frame[k]);
         if (status)
@@ -185,7 +138,14 @@ static drape_status find_ranges(drape_report_data *d)
     }
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
         end_range(&d->fields[f], high[f]);
-    find_body_ranges(d);
+    for (int32_t b = 0; b < d->body_count; b++) {
+        drape_report_field *field = &d->bodies[b].field;
+        memcpy(field->low, lowest, sizeof lowest);
+        memcpy(high[0], highest, sizeof highest);
+        for (int64_t k = 0; k < d->kept; k++)
+            extend_range(field, d->points, load_body(d, b, d->frame[k]), high[0]);
+        end_range(field, high[0]);
+    }
     return DRAPE_OK;
 }
 
@@ -198,7 +158,6 @@ drape_status drape_report_data_make(const drape_report_source *run, size_t max_b
     data->before = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->before);
     data->after = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->after);
     data->strain = drape_arena_take(&data->arena, 2 * (size_t)model->triangle_count, sizeof *data->strain);
-    data->weight = drape_arena_take(&data->arena, nodes, sizeof *data->weight);
     data->node_strain = drape_arena_take(&data->arena, nodes, sizeof *data->node_strain);
     data->speed = drape_arena_take(&data->arena, nodes, sizeof *data->speed);
     if (model->surface.bound) {
@@ -212,12 +171,7 @@ drape_status drape_report_data_make(const drape_report_source *run, size_t max_b
         status = find_bodies(data);
     if (!status)
         status = choose_frames(data, max_bytes);
-    if (status)
-        return status;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        memcpy(data->weight + model->cloths[c].first_node, model->cloths[c].mesh.node_area,
-               (size_t)model->cloths[c].mesh.node_count * sizeof *data->weight);
-    return find_ranges(data);
+    return status ? status : find_ranges(data);
 }
 
 /* ---- Base64 (RFC 4648, section 4) ---- */
@@ -249,16 +203,12 @@ static void put_byte(encoder *e, unsigned byte)
 
 /* ---- Into the page ---- */
 
-static unsigned level_of(const drape_report_field *field, int k, double value)
-{
-    double level = field->step[k] > 0 ? floor((value - field->low[k]) / field->step[k] + 0.5) : 0;
-    return !(level > 0) ? 0 : level > LEVELS ? LEVELS : (unsigned)level;
-}
-
 static void put_values(encoder *e, const drape_report_field *f, const double *values, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
-        const unsigned level = level_of(f, (int)(i % (size_t)f->width), values[i]);
+        const size_t k = i % (size_t)f->width;
+        const double steps = f->step[k] > 0 ? floor((values[i] - f->low[k]) / f->step[k] + 0.5) : 0;
+        const unsigned level = !(steps > 0) ? 0 : steps > LEVELS ? LEVELS : (unsigned)steps;
         put_byte(e, level);
         put_byte(e, level >> 8);
     }

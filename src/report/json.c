@@ -58,22 +58,6 @@ static drape_status read_columns(const drape_report_source *run, const char *nam
     return status;
 }
 
-static drape_status read_steps(const drape_report_source *run, json_t **out)
-{
-    static const char *const names[] = {"t",        "h",         "accepted", "iterations",
-                                        "residual", "tolerance", "reason"};
-    columns c = {.names = names, .count = 7, .text_from = 6, .keep = 2};
-    return read_columns(run, "steps.csv", &c, out);
-}
-
-static drape_status read_energies(const drape_report_source *run, json_t **out)
-{
-    static const char *const names[] = {"t_state", "kinetic",    "elastic",   "gravity",
-                                        "contact", "dissipated", "numerical", "total"};
-    columns c = {.names = names, .count = 8, .text_from = 8, .keep = -1};
-    return read_columns(run, "energy.csv", &c, out);
-}
-
 /* ---- Scene ---- */
 
 static json_t *parameters(const drape_collider *collider)
@@ -105,21 +89,16 @@ static json_t *shape(const drape_collider_shape *shape, const drape_report_body 
                      "triangles", corners);
 }
 
-static const drape_report_body *body_of(const drape_report_data *data, const drape_collider *c)
-{
-    const drape_report_body *found = NULL;
-    for (int32_t b = 0; b < data->body_count; b++)
-        if (&data->run->model->colliders[data->bodies[b].collider] == c)
-            found = &data->bodies[b];
-    return found;
-}
-
 static json_t *collider(const drape_report_data *data, const drape_collider *c)
 {
     json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(c->ops->entry.name), "name",
                                drape_json_text(c->name), "parameters", parameters(c));
+    const drape_report_body *body = NULL;
+    for (int32_t b = 0; b < data->body_count; b++)
+        if (&data->run->model->colliders[data->bodies[b].collider] == c)
+            body = &data->bodies[b];
     if (c->shape.triangle_count > 0)
-        object = drape_json_with(object, "shape", shape(&c->shape, body_of(data, c)));
+        object = drape_json_with(object, "shape", shape(&c->shape, body));
     if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
     json_t *displacements = json_array(), *rotations = json_array();
@@ -139,14 +118,6 @@ static json_t *collider(const drape_report_data *data, const drape_collider *c)
     }
     object = drape_json_with(object, "rotations", rotations);
     return drape_json_with(object, "pivot", drape_json_numbers(c->pivot, 3));
-}
-
-static json_t *colliders(const drape_report_data *data)
-{
-    json_t *array = json_array();
-    for (int32_t i = 0; i < data->run->model->collider_count; i++)
-        array = drape_json_append(array, collider(data, &data->run->model->colliders[i]));
-    return array;
 }
 
 /* NULL: no memory. */
@@ -207,20 +178,28 @@ static int put_escaped(const char *bytes, size_t size, void *file)
 drape_status drape_report_put_json(const drape_report_data *data, drape_file *file)
 {
     const drape_report_source *run = data->run;
+    static const char *const step_names[] = {"t",        "h",         "accepted", "iterations",
+                                             "residual", "tolerance", "reason"};
+    static const char *const energy_names[] = {"t_state", "kinetic",    "elastic",   "gravity",
+                                               "contact", "dissipated", "numerical", "total"};
+    columns of_steps = {.names = step_names, .count = 7, .text_from = 6, .keep = 2},
+            of_energies = {.names = energy_names, .count = 8, .text_from = 8, .keep = -1};
     json_t *steps = NULL, *energies = NULL;
-    drape_status status = read_steps(run, &steps);
+    drape_status status = read_columns(run, "steps.csv", &of_steps, &steps);
     if (!status)
-        status = read_energies(run, &energies);
+        status = read_columns(run, "energy.csv", &of_energies, &energies);
     const char *slash = strrchr(run->record.folder, '/');
+    json_t *colliders = json_array();
+    for (int32_t i = 0; i < run->model->collider_count; i++)
+        colliders = drape_json_append(colliders, collider(data, &run->model->colliders[i]));
     json_t *json = json_pack(
         "{s:s, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
         "name", drape_json_text(slash && slash[1] ? slash + 1 : run->record.folder), "scene",
         drape_json_text(run->scene_text), "summary", run->summary ? json_incref(run->summary) : json_null(),
         "nodes", (int)run->model->surface.node_count, "triangles", (int)run->model->surface.triangle_count,
         "simulated_triangles", (int)run->model->triangle_count, "length",
-        drape_json_number(run->model->length), "pinned", pinned(run->ctx, run->model), "colliders",
-        colliders(data), "frames", frames(data), "fields", fields(data), "steps", steps, "energies",
-        energies);
+        drape_json_number(run->model->length), "pinned", pinned(run->ctx, run->model), "colliders", colliders,
+        "frames", frames(data), "fields", fields(data), "steps", steps, "energies", energies);
     if (!status &&
         (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
         status = drape_fail_memory(run->ctx, 1);

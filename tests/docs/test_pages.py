@@ -354,7 +354,7 @@ def test_statuses():
     for path in glob.glob(SOURCES + "/src/*/*.c"):
         with open(path, encoding="utf-8") as file:
             stray = re.findall(r'reason = [^;,]*"[a-z]|drape_fault \w+ = \{[^;]*?"[a-z]+_[a-z]+", "|\.reason = "[a-z]', file.read())
-        assert not stray, f"{path}: {stray}: not of the table in src/base/reason.c"
+        assert not stray, f"{path}: {stray}: not of the table in src/base/reason.h"
 
 
 def test_summary():
