@@ -107,25 +107,12 @@ static json_t *values_json(const drape_entry *entry, const double *values, bool 
 
 static json_t *form_json(const drape_scene_object *form, const void *def);
 
-/* An element of the array of a key. */
-static json_t *element_json(const drape_scene_key *key, const void *element)
-{
-    const drape_track_key *track = element;
-    if (key->child)
-        return form_json(key->child, element);
-    if (key->shape == DRAPE_SCENE_TRACK)
-        return json_pack("[o, o]", drape_json_number(track->time),
-                         drape_json_numbers(track->displacement, 3));
-    if (key->param.kind == DRAPE_PARAM_TEXT)
-        return drape_json_text(*(const char *const *)element);
-    return key->param.kind == DRAPE_PARAM_NUMBER ? drape_json_number(*(const double *)element)
-                                                 : json_integer(*(const int32_t *)element);
-}
-
+/* The elements of the array of a key. */
 static json_t *array_json(const drape_scene_key *key, const char *def)
 {
+    const bool track = key->shape == DRAPE_SCENE_TRACK, text = key->param.kind == DRAPE_PARAM_TEXT;
     const size_t size = key->child                               ? key->child->def_size
-                        : key->shape == DRAPE_SCENE_TRACK        ? sizeof(drape_track_key)
+                        : track                                  ? sizeof(drape_track_key)
                         : key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t)
                                                                  : sizeof(double);
     const char *elements;
@@ -133,8 +120,17 @@ static json_t *array_json(const drape_scene_key *key, const char *def)
     memcpy(&elements, def + key->offset, sizeof elements);
     memcpy(&count, def + key->count_offset, sizeof count);
     json_t *array = json_array();
-    for (size_t i = 0; i < count; i++)
-        array = drape_json_append(array, element_json(key, elements + i * size));
+    for (size_t i = 0; i < count; i++) {
+        const void *at = elements + i * size;
+        const drape_track_key *point = at;
+        json_t *element = key->child ? form_json(key->child, at)
+                          : track    ? json_pack("[o, o]", drape_json_number(point->time),
+                                                 drape_json_numbers(point->displacement, 3))
+                          : text     ? drape_json_text(*(const char *const *)at)
+                          : key->param.kind == DRAPE_PARAM_NUMBER ? drape_json_number(*(const double *)at)
+                                                                  : json_integer(*(const int32_t *)at);
+        array = drape_json_append(array, element);
+    }
     return array;
 }
 
@@ -251,15 +247,6 @@ static json_t *number(double value, const char *unit)
     return described(drape_json_number(value), unit);
 }
 
-/* Adds a list unless it is empty. */
-static json_t *with_list(json_t *object, const char *key, json_t *list)
-{
-    if (json_array_size(list) > 0 || !list)
-        return drape_json_with(object, key, list);
-    json_decref(list);
-    return object;
-}
-
 /* An array of what is made of each index. */
 static json_t *list_of(const info *in, size_t count, json_t *(*make)(const info *in, int32_t index))
 {
@@ -316,10 +303,9 @@ static json_t *collider(const info *in, int32_t c)
         object = drape_json_with(object, "pivot", described(drape_json_numbers(from->pivot, 3), "m"));
     }
     json_decref(moves);
-    object = drape_json_with(object, "points", count(from->shape.point_count));
-    object = drape_json_with(object, "segments", count(from->shape.segment_count));
-    object = drape_json_with(object, "triangles", count(from->shape.triangle_count));
-    return drape_json_with(object, "nodes_inside", count(in->inside[c]));
+    return DRAPE_JSON_COUNTS(object, {"points", from->shape.point_count},
+                             {"segments", from->shape.segment_count},
+                             {"triangles", from->shape.triangle_count}, {"nodes_inside", in->inside[c]});
 }
 
 static json_t *event(const info *in, int32_t i)
@@ -399,38 +385,12 @@ static json_t *pin(const info *in, const drape_pin *pin, const drape_pin_def *de
     object = drape_json_with(object, "name", drape_json_text(pin->name));
     if (json_array_size(triangles) > 0)
         json_object_del(object, "triangle");
-    object = with_list(object, "triangles", triangles);
+    object = drape_json_with_list(object, "triangles", triangles);
     for (int32_t i = 0; def->turn_count > 0 && i < model->moved_count; i++)
         if (model->moved_node[i] == first && model->moved_track[i] >= 0)
             object = drape_json_with(
                 object, "pivot",
                 described(drape_json_numbers(model->tracks[model->moved_track[i]].pivot, 3), "m"));
-    return object;
-}
-
-static json_t *pins(const info *in, int32_t c)
-{
-    const drape_cloth_def *def = &in->def.cloths[c];
-    const drape_pin *first = in->model->pins;
-    json_t *list = json_array();
-    for (int32_t i = 0; i < c; i++)
-        first += in->def.cloths[i].pin_count;
-    for (size_t i = 0; i < def->pin_count; i++)
-        list = drape_json_append(list, pin(in, &first[i], &def->pins[i]));
-    return list;
-}
-
-/* Adds how the cloth starts unless it is at rest. */
-static json_t *with_start(json_t *object, const drape_cloth_def *def)
-{
-    const drape_scene_object *form = drape_scene_key_of(&drape_form_cloth, "start")->child;
-    drape_start_def defaults = {.file = NULL};
-    drape_scene_set_defaults(form, &defaults);
-    json_t *start = form_json(form, &def->start), *rest = form_json(form, &defaults);
-    if (!json_equal(start, rest))
-        object = drape_json_with(object, "start", json_incref(start));
-    json_decref(start);
-    json_decref(rest);
     return object;
 }
 
@@ -467,8 +427,8 @@ static json_t *render_mesh(const info *in, int32_t c)
     json_object_update(object, keys);
     json_decref(keys);
     object = drape_json_with(object, "max_distance", number(cloth->max_distance, "m"));
-    object = drape_json_with(object, "vertices", count(cloth->render_mesh.node_count));
-    return drape_json_with(object, "triangles", count(cloth->render_mesh.triangle_count));
+    return DRAPE_JSON_COUNTS(object, {"vertices", cloth->render_mesh.node_count},
+                             {"triangles", cloth->render_mesh.triangle_count});
 }
 
 /* Adds a stiffness of a measured fabric unless it is that of an isotropic material. */
@@ -511,21 +471,33 @@ static json_t *cloth(const info *in, int32_t c)
         mass += in->model->mass[i];
     for (int32_t t = 0; t < from->mesh.triangle_count; t++)
         area += from->mesh.triangle_area[t];
-    json_t *object = drape_json_with(named(from->name), "nodes", count(from->mesh.node_count));
-    object = drape_json_with(object, "triangles", count(from->mesh.triangle_count));
-    object = drape_json_with(object, "edges", count(from->mesh.edge_count));
+    const drape_pin *of_cloth = in->model->pins;
+    json_t *pins = json_array();
+    for (int32_t i = 0; i < c; i++)
+        of_cloth += in->def.cloths[i].pin_count;
+    for (size_t i = 0; i < def->pin_count; i++)
+        pins = drape_json_append(pins, pin(in, &of_cloth[i], &def->pins[i]));
+    const drape_scene_object *form = drape_scene_key_of(&drape_form_cloth, "start")->child;
+    drape_start_def defaults = {.file = NULL};
+    drape_scene_set_defaults(form, &defaults);
+    json_t *start = form_json(form, &def->start), *rest = form_json(form, &defaults);
+    json_t *object =
+        DRAPE_JSON_COUNTS(named(from->name), {"nodes", from->mesh.node_count},
+                          {"triangles", from->mesh.triangle_count}, {"edges", from->mesh.edge_count});
     object = drape_json_with(object, "mesh", mesh(in, from, &def->mesh));
     object = drape_json_with(object, "mass", number(mass, "kg"));
     object = drape_json_with(object, "area", number(area, "m2"));
     object = with_keys(object, &drape_form_cloth, def);
-    object = drape_json_with(object, "pinned", count(pinned));
-    object = drape_json_with(object, "moved", count(moved));
-    object = drape_json_with(object, "supported", count(supported));
-    object = with_list(object, "pins", pins(in, c));
-    object = with_list(object, "masses", forms_json(&drape_form_mass, def->masses, def->mass_count));
+    object = DRAPE_JSON_COUNTS(object, {"pinned", pinned}, {"moved", moved}, {"supported", supported});
+    object = drape_json_with_list(object, "pins", pins);
     object =
-        with_list(object, "periodic", forms_json(&drape_form_periodic, def->periodic, def->periodic_count));
-    object = with_start(object, def);
+        drape_json_with_list(object, "masses", forms_json(&drape_form_mass, def->masses, def->mass_count));
+    object = drape_json_with_list(object, "periodic",
+                                  forms_json(&drape_form_periodic, def->periodic, def->periodic_count));
+    if (!json_equal(start, rest)) /* how the cloth starts unless it is at rest */
+        object = drape_json_with(object, "start", json_incref(start));
+    json_decref(start);
+    json_decref(rest);
     if (from->bound)
         object = drape_json_with(object, "render_mesh", render_mesh(in, c));
     return drape_json_with(object, "material", material(in, from));
@@ -543,14 +515,12 @@ static json_t *term(const info *in, int32_t i)
     if (from->ops->law)
         object = drape_json_with(object, "acts_on", count(cost->acts_on));
     object = drape_json_with(object, "element", json_string(from->ops->element_name));
-    object = drape_json_with(object, "elements", count(from->elements.count));
-    object = drape_json_with(object, "nodes_an_element", count(from->elements.nodes));
-    object = drape_json_with(object, "nonzeros", count(cost->nonzeros));
-    object = drape_json_with(object, "bytes", count((int64_t)cost->bytes));
-    object = drape_json_with(object, "residual_s", drape_json_number(cost->residual_seconds));
-    object = drape_json_with(object, "jacobian_s", drape_json_number(cost->jacobian_seconds));
-    object = drape_json_with(object, "share",
-                             drape_json_number(seconds / fmax(drape_profile_seconds(&in->profile), 1e-300)));
+    object = DRAPE_JSON_COUNTS(object, {"elements", from->elements.count},
+                               {"nodes_an_element", from->elements.nodes}, {"nonzeros", cost->nonzeros},
+                               {"bytes", (int64_t)cost->bytes});
+    object = DRAPE_JSON_REALS(object, {"residual_s", cost->residual_seconds},
+                              {"jacobian_s", cost->jacobian_seconds},
+                              {"share", seconds / fmax(drape_profile_seconds(&in->profile), 1e-300)});
     json_t *parameters =
         params_json(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL);
     if (from->history && *from->history->name)
@@ -567,12 +537,10 @@ static json_t *iteration(const info *in)
     double outside = p->residual_seconds + p->jacobian_seconds;
     for (int32_t i = 0; i < in->model->term_count; i++)
         outside -= p->terms[i].residual_seconds + p->terms[i].jacobian_seconds;
-    json_t *object = drape_json_with(json_object(), "residual_s", drape_json_number(p->residual_seconds));
-    object = drape_json_with(object, "jacobian_s", drape_json_number(p->jacobian_seconds));
-    object = drape_json_with(object, "factor_s", drape_json_number(p->factor_seconds));
-    object = drape_json_with(object, "solve_s", drape_json_number(p->solve_seconds));
-    object = drape_json_with(object, "total_s", drape_json_number(drape_profile_seconds(p)));
-    object = drape_json_with(object, "outside_terms_s", drape_json_number(fmax(outside, 0)));
+    json_t *object = DRAPE_JSON_REALS(json_object(), {"residual_s", p->residual_seconds},
+                                      {"jacobian_s", p->jacobian_seconds}, {"factor_s", p->factor_seconds},
+                                      {"solve_s", p->solve_seconds}, {"total_s", drape_profile_seconds(p)},
+                                      {"outside_terms_s", fmax(outside, 0)});
     object = drape_json_with(object, "implicit", json_boolean(p->implicit));
     object = drape_json_with(object, "factored", json_boolean(p->implicit && !p->factor_status));
     object = drape_json_with(object, "linear_solver", json_string(p->linear_solver));
@@ -586,13 +554,11 @@ static json_t *bytes(const info *in)
 {
     const drape_profile *p = &in->profile;
     const size_t sum = drape_profile_bytes(p);
-    json_t *object = drape_json_with(json_object(), "model", count((int64_t)p->model_bytes));
-    object = drape_json_with(object, "meshes", count((int64_t)p->mesh_bytes));
-    object = drape_json_with(object, "sparsity", count((int64_t)p->pattern_bytes));
-    object = drape_json_with(object, "evaluation", count((int64_t)p->system_bytes));
-    object = drape_json_with(object, "integrator", count((int64_t)p->integrator_bytes));
-    object = drape_json_with(object, "state", count((int64_t)p->state_bytes));
-    object = drape_json_with(object, "total", count((int64_t)sum));
+    json_t *object = DRAPE_JSON_COUNTS(
+        json_object(), {"model", (int64_t)p->model_bytes}, {"meshes", (int64_t)p->mesh_bytes},
+        {"sparsity", (int64_t)p->pattern_bytes}, {"evaluation", (int64_t)p->system_bytes},
+        {"integrator", (int64_t)p->integrator_bytes}, {"state", (int64_t)p->state_bytes},
+        {"total", (int64_t)sum});
     return drape_json_with(object, "a_node", drape_json_number((double)sum / in->model->node_count));
 }
 
@@ -625,19 +591,17 @@ static json_t *scene(const info *in)
     json_t *object = drape_json_with(json_object(), "scene", drape_json_text(in->command->operand));
     object = with_keys(object, &drape_form_scene, &in->def);
     object = with_keys(object, &drape_form_output, &in->def);
-    object = drape_json_with(object, "frames", count(frames));
-    object = drape_json_with(object, "nodes", count(model->node_count));
-    object = drape_json_with(object, "free", count(model->free_count));
-    object = drape_json_with(object, "dofs", count(model->pattern.n));
-    object = drape_json_with(object, "nnz", count(model->pattern.nonzeros));
+    object = DRAPE_JSON_COUNTS(object, {"frames", frames}, {"nodes", model->node_count},
+                               {"free", model->free_count}, {"dofs", model->pattern.n},
+                               {"nnz", model->pattern.nonzeros});
     object = drape_json_with(object, "tolerance", number(drape_sim_statistics(in->sim).tolerance, "N"));
     object = drape_json_with(object, "cloths", list_of(in, (size_t)model->cloth_count, cloth));
-    object = with_list(object, "colliders", list_of(in, (size_t)model->collider_count, collider));
+    object = drape_json_with_list(object, "colliders", list_of(in, (size_t)model->collider_count, collider));
     object = with_contact(object, in);
-    object = with_list(object, "events", list_of(in, (size_t)model->event_count, event));
+    object = drape_json_with_list(object, "events", list_of(in, (size_t)model->event_count, event));
     object = drape_json_with(object, "seams", list_of(in, (size_t)model->seam_count, seam));
-    object = with_list(object, "histories",
-                       forms_json(&drape_form_history, in->def.histories, in->def.history_count));
+    object = drape_json_with_list(object, "histories",
+                                  forms_json(&drape_form_history, in->def.histories, in->def.history_count));
     object = drape_json_with(object, "integrator",
                              chosen(in, &all->integrator->entry, all->integrator_values, &model->integrator,
                                     drape_chosen_ignores_integrator));

@@ -32,6 +32,15 @@ static inline json_t *drape_json_append(json_t *array, json_t *value)
     return NULL;
 }
 
+/* Adds a list to an object unless it is empty. Takes both references, as above. */
+static inline json_t *drape_json_with_list(json_t *object, const char *key, json_t *list)
+{
+    if (json_array_size(list) > 0 || !list)
+        return drape_json_with(object, key, list);
+    json_decref(list);
+    return object;
+}
+
 static inline int drape_json_put_piece(const char *bytes, size_t size, void *file)
 {
     drape_file_put(file, bytes, size);
@@ -49,6 +58,36 @@ static inline void drape_json_put(drape_file *file, const json_t *value, size_t 
 static inline json_t *drape_json_number(double value)
 {
     return isfinite(value) ? json_real(value) : json_null();
+}
+
+/* Several counts, or numbers, of an object: DRAPE_JSON_COUNTS(object, {"nodes", 3}, {"dofs", 9}). */
+typedef struct drape_json_count {
+    const char *key;
+    int64_t value;
+} drape_json_count;
+
+typedef struct drape_json_real {
+    const char *key;
+    double value;
+} drape_json_real;
+
+#define DRAPE_JSON_COUNTS(object, ...)                                                                       \
+    drape_json_with_counts(object, (const drape_json_count[]){__VA_ARGS__, {NULL, 0}})
+#define DRAPE_JSON_REALS(object, ...)                                                                        \
+    drape_json_with_reals(object, (const drape_json_real[]){__VA_ARGS__, {NULL, 0}})
+
+static inline json_t *drape_json_with_counts(json_t *object, const drape_json_count *items)
+{
+    for (; items->key; items++)
+        object = drape_json_with(object, items->key, json_integer((json_int_t)items->value));
+    return object;
+}
+
+static inline json_t *drape_json_with_reals(json_t *object, const drape_json_real *items)
+{
+    for (; items->key; items++)
+        object = drape_json_with(object, items->key, drape_json_number(items->value));
+    return object;
 }
 
 static inline json_t *drape_json_numbers(const double *values, size_t count)

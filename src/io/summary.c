@@ -15,105 +15,24 @@
 #include <math.h>
 #include <string.h>
 
-typedef struct real_item {
-    const char *key;
-    double value;
-} real_item;
-
-typedef struct count_item {
-    const char *key;
-    int64_t value;
-} count_item;
-
-#define LENGTH(array) (sizeof(array) / sizeof *(array))
-
-static json_t *with_reals(json_t *object, const real_item *items, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        object = drape_json_with(object, items[i].key, drape_json_number(items[i].value));
-    return object;
-}
-
-static json_t *with_counts(json_t *object, const count_item *items, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        object = drape_json_with(object, items[i].key, json_integer((json_int_t)items[i].value));
-    return object;
-}
-
-static json_t *reasons(const drape_sim *sim)
-{
-    json_t *object = json_object();
-    int64_t count = 0;
-    const char *reason;
-    for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
-        object = drape_json_with(object, reason, json_integer((json_int_t)count));
-    return object;
-}
-
-static json_t *steps(const drape_sim *sim, const drape_statistics *s)
-{
-    const count_item counts[] = {{"accepted", s->steps_accepted},
-                                 {"rejected", s->steps_rejected},
-                                 {"unconverged", s->steps_unconverged},
-                                 {"held", s->steps_held}};
-    const real_item sizes[] = {{"h_min", s->h_min}, {"h_max", s->h_max}};
-    json_t *object = with_counts(json_object(), counts, LENGTH(counts));
-    return drape_json_with(with_reals(object, sizes, LENGTH(sizes)), "reasons", reasons(sim));
-}
-
-static json_t *newton(const drape_statistics *s)
-{
-    const count_item counts[] = {{"iterations", s->newton_iterations},
-                                 {"jacobians", s->jacobians},
-                                 {"factorizations", s->factorizations},
-                                 {"linear_iterations", s->linear_iterations},
-                                 {"residuals", s->residuals}};
-    return with_counts(json_object(), counts, LENGTH(counts));
-}
-
 /* The estimated distance of steps to the solution of their equation [m], and the energy that is left [J]. */
 static json_t *error(const drape_statistics *s, const drape_left *left)
 {
-    const real_item amounts[] = {{"bound", s->error_bound},
-                                 {"largest", s->error_max},
-                                 {"last", s->error_last},
-                                 {"largest_left", left->largest},
-                                 {"last_left", left->last}};
-    const count_item counts[] = {{"steps_above", s->steps_above_error},
-                                 {"steps_by_local_error", left->by_error},
-                                 {"steps_above_local_error", left->above_own}};
-    return with_counts(with_reals(json_object(), amounts, LENGTH(amounts)), counts, LENGTH(counts));
-}
-
-static json_t *wall(const drape_summary_def *def, const drape_statistics *s)
-{
-    const real_item times[] = {
-        {"total", def->wall_total},     {"setup", s->wall_setup},       {"steps", s->wall_steps},
-        {"residual", s->wall_residual}, {"jacobian", s->wall_jacobian}, {"factor", s->wall_factor},
-        {"solve", s->wall_solve},       {"contact", s->wall_contact},   {"output", def->wall_output}};
-    return with_reals(json_object(), times, LENGTH(times));
-}
-
-static json_t *energy(drape_sim *sim)
-{
-    drape_energy e = drape_sim_energy(sim);
-    const real_item parts[] = {{"kinetic", e.kinetic},       {"elastic", e.elastic},
-                               {"gravity", e.gravity},       {"contact", e.contact},
-                               {"dissipated", e.dissipated}, {"numerical", e.numerical}};
-    return with_reals(json_object(), parts, LENGTH(parts));
+    return DRAPE_JSON_COUNTS(DRAPE_JSON_REALS(json_object(), {"bound", s->error_bound},
+                                              {"largest", s->error_max}, {"last", s->error_last},
+                                              {"largest_left", left->largest}, {"last_left", left->last}),
+                             {"steps_above", s->steps_above_error}, {"steps_by_local_error", left->by_error},
+                             {"steps_above_local_error", left->above_own});
 }
 
 static json_t *realtime(const drape_summary_realtime *r)
 {
-    const count_item counts[] = {
-        {"frames", r->frames},         {"missed", r->missed},      {"full", r->full},
-        {"fewer", r->fewer},           {"larger", r->larger},      {"still", r->still},
-        {"inaccurate", r->inaccurate}, {"crossings", r->crossings}};
-    const real_item times[] = {{"budget", r->budget},  {"p50", r->p50},     {"p95", r->p95},
-                               {"p99", r->p99},        {"worst", r->worst}, {"debt", r->debt},
-                               {"dropped", r->dropped}};
-    return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
+    return DRAPE_JSON_REALS(DRAPE_JSON_COUNTS(json_object(), {"frames", r->frames}, {"missed", r->missed},
+                                              {"full", r->full}, {"fewer", r->fewer}, {"larger", r->larger},
+                                              {"still", r->still}, {"inaccurate", r->inaccurate},
+                                              {"crossings", r->crossings}),
+                            {"budget", r->budget}, {"p50", r->p50}, {"p95", r->p95}, {"p99", r->p99},
+                            {"worst", r->worst}, {"debt", r->debt}, {"dropped", r->dropped});
 }
 
 /* A count of the sim; null if the host cancelled it; NULL, which fails the summary, if memory was out. */
@@ -137,9 +56,7 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
         one = drape_json_with(one, "intersections", found(sim, inside.intersections));
         list = drape_json_append(list, one);
     }
-    if (colliders > 0)
-        object = drape_json_with(object, "inside", json_incref(list));
-    json_decref(list);
+    object = drape_json_with_list(object, "inside", list);
     return drape_json_with(object, "intersections", found(sim, drape_sim_intersections(sim, -1)));
 }
 
@@ -150,21 +67,16 @@ static json_t *with_no_room(json_t *object, const drape_sim *sim)
     json_t *list = json_array();
     for (int32_t c = -1; c < drape_sim_model(sim)->collider_count; c++) {
         const drape_relaxed_total *total = drape_sim_relaxed_total(sim, c);
-        const real_item values[] = {{"deepest", total->deepest},
-                                    {"first", total->first},
-                                    {"last", total->last},
-                                    {"seconds", total->seconds}};
-        const count_item counts[] = {{"now", drape_sim_relaxed_at(sim, c)}, {"most", total->most}};
         if (total->most == 0)
             continue;
         json_t *one = drape_json_with(json_object(), "at", drape_json_text(drape_sim_relaxed_name(sim, c)));
         list = drape_json_append(
-            list, with_reals(with_counts(one, counts, LENGTH(counts)), values, LENGTH(values)));
+            list, DRAPE_JSON_REALS(
+                      DRAPE_JSON_COUNTS(one, {"now", drape_sim_relaxed_at(sim, c)}, {"most", total->most}),
+                      {"deepest", total->deepest}, {"first", total->first}, {"last", total->last},
+                      {"seconds", total->seconds}));
     }
-    if (!list || json_array_size(list) > 0)
-        return drape_json_with(object, "no_room", list);
-    json_decref(list);
-    return object;
+    return drape_json_with_list(object, "no_room", list);
 }
 
 /* What the untangling of the start, or the last one of a host, found and did. */
@@ -174,12 +86,6 @@ static json_t *with_untangling(json_t *object, const drape_sim *sim)
     const drape_untangling *u = &sim->untangling;
     if (!sim->untangled)
         return object;
-    const count_item counts[] = {{"sweeps", u->sweeps}, {"pairs_before", u->pairs_before},
-                                 {"pairs", u->pairs},   {"inside_before", u->inside_before},
-                                 {"inside", u->inside}, {"node", u->node}};
-    const real_item reals[] = {{"time", u->time},           {"least_gap_before", u->least_gap_before},
-                               {"least_gap", u->least_gap}, {"displacement", u->displacement},
-                               {"strain", u->strain},       {"seconds", u->seconds}};
     json_t *list = json_array(), *one = drape_json_with(json_object(), "clear", json_boolean(u->clear));
     for (int32_t c = 0; c < model->cloth_count; c++) {
         if (!(sim->untangled_move[c] > 0))
@@ -188,7 +94,11 @@ static json_t *with_untangling(json_t *object, const drape_sim *sim)
         list = drape_json_append(
             list, drape_json_with(cloth, "displacement", drape_json_number(sim->untangled_move[c])));
     }
-    one = with_reals(with_counts(one, counts, LENGTH(counts)), reals, LENGTH(reals));
+    one = DRAPE_JSON_REALS(
+        DRAPE_JSON_COUNTS(one, {"sweeps", u->sweeps}, {"pairs_before", u->pairs_before}, {"pairs", u->pairs},
+                          {"inside_before", u->inside_before}, {"inside", u->inside}, {"node", u->node}),
+        {"time", u->time}, {"least_gap_before", u->least_gap_before}, {"least_gap", u->least_gap},
+        {"displacement", u->displacement}, {"strain", u->strain}, {"seconds", u->seconds});
     return drape_json_with(object, "untangling", drape_json_with(one, "cloths", list));
 }
 
@@ -209,10 +119,7 @@ static json_t *with_events(json_t *object, const drape_sim *sim)
         one = drape_json_with(one, "count", json_integer((json_int_t)w->count));
         list = drape_json_append(list, drape_json_with(one, "occurrences", times));
     }
-    if (sim->events.count > 0)
-        return drape_json_with(object, "events", list);
-    json_decref(list);
-    return object;
+    return drape_json_with_list(object, "events", list);
 }
 
 /* What each seam carries at the end. */
@@ -223,22 +130,15 @@ static json_t *with_seams(json_t *object, drape_sim *sim)
     const int32_t count = drape_sim_seam(sim, -1, NULL);
     for (int32_t i = 0; i < count; i++) {
         drape_sim_seam(sim, i, &s);
-        const real_item reals[] = {{"gap_mean", s.gap_mean},
-                                   {"gap_max", s.gap_max},
-                                   {"tension", s.tension},
-                                   {"tension_max", s.tension_max}};
-        json_t *force = json_array(), *one = drape_json_with(json_object(), "name", drape_json_text(s.name));
-        for (int k = 0; k < 3; k++)
-            force = drape_json_append(force, drape_json_number(s.force[k]));
+        json_t *one = drape_json_with(json_object(), "name", drape_json_text(s.name));
         one = drape_json_with(one, "type", drape_json_text(s.type));
         one = drape_json_with(one, "pairs", json_integer((json_int_t)s.pairs));
-        one = drape_json_with(with_reals(one, reals, LENGTH(reals)), "force", force);
+        one = drape_json_with(DRAPE_JSON_REALS(one, {"gap_mean", s.gap_mean}, {"gap_max", s.gap_max},
+                                               {"tension", s.tension}, {"tension_max", s.tension_max}),
+                              "force", drape_json_numbers(s.force, 3));
         list = drape_json_append(list, one);
     }
-    if (count > 0)
-        return drape_json_with(object, "seams", list);
-    json_decref(list);
-    return object;
+    return drape_json_with_list(object, "seams", list);
 }
 
 static json_t *warnings(drape_sim *sim)
@@ -263,25 +163,44 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
 {
     const drape_model *model = drape_sim_model(sim);
     const drape_statistics s = drape_sim_statistics(sim);
-    const count_item sizes[] = {{"nodes", drape_model_node_count(model)},
-                                {"dofs", drape_model_dof_count(model)},
-                                {"nnz", drape_model_nonzero_count(model)},
-                                {"frames", def->frames}};
-    const real_item strains[] = {{"min", s.strain_min}, {"max", s.strain_max}};
+    const drape_energy e = drape_sim_energy(sim);
+    const char *reason;
+    int64_t count = 0;
     char digits[17];
     json_t *object = drape_json_with(json_object(), "status", json_string(drape_status_name(def->status)));
     object = drape_json_with(object, "message", drape_json_text(def->message ? def->message : ""));
     object = drape_json_with(object, "version", json_string(drape_version()));
-    object = with_counts(object, sizes, LENGTH(sizes));
+    object = DRAPE_JSON_COUNTS(object, {"nodes", drape_model_node_count(model)},
+                               {"dofs", drape_model_dof_count(model)},
+                               {"nnz", drape_model_nonzero_count(model)}, {"frames", def->frames});
     object = drape_json_with(object, "time", drape_json_number(drape_sim_time(sim)));
-    object = drape_json_with(object, "steps", steps(sim, &s));
-    object = drape_json_with(object, "newton", newton(&s));
+    json_t *reasons = json_object();
+    for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
+        reasons = drape_json_with(reasons, reason, json_integer((json_int_t)count));
+    json_t *steps =
+        DRAPE_JSON_COUNTS(json_object(), {"accepted", s.steps_accepted}, {"rejected", s.steps_rejected},
+                          {"unconverged", s.steps_unconverged}, {"held", s.steps_held});
+    steps = DRAPE_JSON_REALS(steps, {"h_min", s.h_min}, {"h_max", s.h_max});
+    object = drape_json_with(object, "steps", drape_json_with(steps, "reasons", reasons));
+    json_t *newton =
+        DRAPE_JSON_COUNTS(json_object(), {"iterations", s.newton_iterations}, {"jacobians", s.jacobians},
+                          {"factorizations", s.factorizations}, {"linear_iterations", s.linear_iterations},
+                          {"residuals", s.residuals});
+    object = drape_json_with(object, "newton", newton);
     object = drape_json_with(object, "tolerance", drape_json_number(s.tolerance));
     if (!isnan(s.error_bound) || !isnan(s.error_max))
         object = drape_json_with(object, "error", error(&s, &sim->left));
-    object = drape_json_with(object, "wall_s", wall(def, &s));
-    object = drape_json_with(object, "energy", energy(sim));
-    object = drape_json_with(object, "strain", with_reals(json_object(), strains, LENGTH(strains)));
+    json_t *wall = DRAPE_JSON_REALS(
+        json_object(), {"total", def->wall_total}, {"setup", s.wall_setup}, {"steps", s.wall_steps},
+        {"residual", s.wall_residual}, {"jacobian", s.wall_jacobian}, {"factor", s.wall_factor},
+        {"solve", s.wall_solve}, {"contact", s.wall_contact}, {"output", def->wall_output});
+    object = drape_json_with(object, "wall_s", wall);
+    json_t *energy = DRAPE_JSON_REALS(json_object(), {"kinetic", e.kinetic}, {"elastic", e.elastic},
+                                      {"gravity", e.gravity}, {"contact", e.contact},
+                                      {"dissipated", e.dissipated}, {"numerical", e.numerical});
+    object = drape_json_with(object, "energy", energy);
+    object = drape_json_with(object, "strain",
+                             DRAPE_JSON_REALS(json_object(), {"min", s.strain_min}, {"max", s.strain_max}));
     if (s.stability_known) /* of an equilibrium; the number is that of negative eigenvalues of its Hessian */
         object = drape_json_with(object, "equilibrium",
                                  json_pack("{s:b, s:I}", "stable", s.unstable_modes == 0, "unstable_modes",
