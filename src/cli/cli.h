@@ -144,6 +144,32 @@ void cli_signals_cancel(drape_sim *sim);
 /* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */
 int cli_report_interrupted(const char *verb);
 
+/* ---- Progress: a line on the terminal. If stderr is not a terminal, an experiment adds a line every five
+ * minutes to it, and others nothing ---- */
+
+typedef struct cli_progress {
+    bool on;             /* stderr is a terminal */
+    bool logs;           /* it is not, and lines are added to it; set by the caller */
+    double from, end;    /* simulated time at the beginning and the end [s] */
+    double start, shown; /* clock at the beginning and at the last update [s] */
+    int width;           /* columns of the line */
+} cli_progress;
+
+/* Of a run of the sim up to the simulated time `end`; NULL: of a sweep, whose progress is a number of
+ * cases. */
+void cli_progress_begin(cli_progress *progress, const drape_sim *sim, double end);
+/* Shows the simulated time; updates at most ten times a second, as cli_progress_count does. */
+void cli_progress_show(cli_progress *progress, const drape_sim *sim);
+/* Shows the number of cases; total 0: their reference is being computed. */
+void cli_progress_count(cli_progress *progress, int64_t done, int64_t total, double seconds_left);
+/* Erases the line until it is shown again, for other output on the terminal; or for good. */
+void cli_progress_hide(cli_progress *progress);
+void cli_progress_clear(cli_progress *progress);
+
+/* Finds a shading by its name; NULL: the default one. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was
+ * printed. */
+int cli_find_shading(const cli_command *command, const char *name, int *index);
+
 /* ---- Scenes ---- */
 
 /* A context whose scenes, models and sims stop if the program is interrupted. */

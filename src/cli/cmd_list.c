@@ -157,6 +157,12 @@ static bool is_shown(const drape_entry *entry, const char *only)
     return !only || strcmp(only, entry->name) == 0;
 }
 
+/* "": it has none. */
+static const char *reference_of(const drape_entry *entry)
+{
+    return entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "";
+}
+
 static void text_scene(void)
 {
     puts(SCENE_TITLE " (" SCENE_NAME "): its keys, object by object; N counts from 0");
@@ -196,8 +202,8 @@ static void text_entry(const drape_registry *table, const char *only, int at)
     (void)only;
     const drape_entry *entry = table->entries[at];
     printf("\n  %-20s %s\n", entry->name, entry->summary);
-    if (entry->reference && strcmp(entry->reference, "-") != 0)
-        printf("  %-20s [%s]\n", "", entry->reference);
+    if (*reference_of(entry))
+        printf("  %-20s [%s]\n", "", reference_of(entry));
 }
 
 static void text_param(const drape_param *param)
@@ -311,12 +317,6 @@ static void markdown_entries_begin(const drape_registry *table)
         printf("\n`%s`: %s.\n", table->entries[0]->name, table->entries[0]->summary);
 }
 
-static bool is_same_entry(const drape_entry *a, const drape_entry *b)
-{
-    return strcmp(a->summary, b->summary) == 0 &&
-           strcmp(a->reference ? a->reference : "", b->reference ? b->reference : "") == 0;
-}
-
 /* One line for all entries of which the same is said, at the first of them. */
 static void markdown_entry(const drape_registry *table, const char *only, int at)
 {
@@ -324,7 +324,8 @@ static void markdown_entry(const drape_registry *table, const char *only, int at
     const char *names[MAX_NAMES];
     int count = 0;
     for (int i = 0; table->entries[i] && count < MAX_NAMES; i++)
-        if (is_shown(table->entries[i], only) && is_same_entry(table->entries[i], entry)) {
+        if (is_shown(table->entries[i], only) && strcmp(table->entries[i]->summary, entry->summary) == 0 &&
+            strcmp(reference_of(table->entries[i]), reference_of(entry)) == 0) {
             if (i < at)
                 return;
             names[count++] = table->entries[i]->name;
@@ -334,7 +335,7 @@ static void markdown_entry(const drape_registry *table, const char *only, int at
     fputs("|", stdout);
     names_cell(names, count);
     cell(entry->summary);
-    cell(entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "");
+    cell(reference_of(entry));
     fputc('\n', stdout);
 }
 

@@ -132,28 +132,12 @@ static drape_status emit_frames(const job *j)
     return DRAPE_OK;
 }
 
-static drape_status write_output(const job *j)
-{
-    const modes_request *request = j->request;
-    const cli_shapes shapes = {
-        .folder = request->out, .table = TABLE, .frames = (int64_t)j->modes.count * frames_of(request)};
-    drape_recorder *recorder = NULL;
-    drape_status status = cli_shapes_open(&request->command, &j->in, &shapes, &recorder);
-    if (!status)
-        status = write_table(j, drape_recorder_folder(recorder));
-    if (!status)
-        status = emit_frames(j);
-    if (!status)
-        status = drape_recorder_finish(recorder);
-    drape_recorder_destroy(&recorder);
-    return status;
-}
-
 /* ---- The verb ---- */
 
 static int compute(job *j, const cli_state *state)
 {
     const modes_request *request = j->request;
+    drape_recorder *recorder = NULL;
     drape_modes_def def;
     drape_modes_def_init(&def, sizeof def);
     def.count = request->count ? request->count : def.count;
@@ -162,8 +146,18 @@ static int compute(job *j, const cli_state *state)
     drape_status status = cli_state_reach(state, &j->in);
     if (!status)
         status = drape_sim_modes(j->in.sim, &def, &j->modes);
-    if (!status && request->out)
-        status = write_output(j);
+    if (!status && request->out) {
+        const cli_shapes shapes = {
+            .folder = request->out, .table = TABLE, .frames = (int64_t)j->modes.count * frames_of(request)};
+        status = cli_shapes_open(&request->command, &j->in, &shapes, &recorder);
+    }
+    if (!status && recorder)
+        status = write_table(j, drape_recorder_folder(recorder));
+    if (!status && recorder)
+        status = emit_frames(j);
+    if (!status && recorder)
+        status = drape_recorder_finish(recorder);
+    drape_recorder_destroy(&recorder);
     if (status && cli_interrupted())
         return cli_report_interrupted(request->command.verb);
     if (status)

@@ -48,49 +48,35 @@ static double largest_displacement(const drape_model *m, const double *x)
     return most;
 }
 
-static drape_status write_row(job *j, const drape_path_point *point)
-{
-    const drape_model *m = j->in.model;
-    const double *x = drape_sim_positions(j->in.sim);
-    drape_file *file = &j->table;
-    drape_file_print(file, "%" PRId64, point->number);
-    drape_csv_put_text(file, events[point->event]);
-    drape_csv_put_numbers(file, 4, (double[]){point->factor, point->arc, point->elastic, point->potential});
-    drape_csv_put_integer(file, point->unstable);
-    drape_csv_put_integer(file, point->iterations);
-    drape_csv_put_numbers(file, 2, (double[]){point->residual, largest_displacement(m, x)});
-    for (size_t i = 0; i < j->request->nodes.count; i++)
-        for (size_t k = 0; k < 3; k++)
-            drape_csv_put_number(file, x[3 * (size_t)j->node[i] + k] - m->rest[3 * (size_t)j->node[i] + k]);
-    drape_file_put_text(file, "\n");
-    return drape_file_keep(file);
-}
-
-static drape_status open_table(job *j)
-{
-    char columns[64 + CLI_MAX_TEXTS * 64] =
-        "point,event,factor,arc,elastic,potential,unstable,iterations,residual,displacement";
-    size_t used = strlen(columns);
-    for (size_t i = 0; i < j->request->nodes.count; i++)
-        used += (size_t)snprintf(columns + used, sizeof columns - used, ",u%d_x,u%d_y,u%d_z", (int)j->node[i],
-                                 (int)j->node[i], (int)j->node[i]);
-    snprintf(columns + used, sizeof columns - used, "\n");
-    return drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, &j->table);
-}
-
 static drape_status observe(void *user, drape_sim *sim, const drape_path_point *point)
 {
     job *j = user;
+    const double *x = drape_sim_positions(sim), *rest = j->in.model->rest;
+    const double displacement = largest_displacement(j->in.model, x);
+    drape_file *file = &j->table;
     drape_status status = DRAPE_OK;
-    if (j->recorder)
-        status = write_row(j, point);
+    if (j->recorder) {
+        drape_file_print(file, "%" PRId64, point->number);
+        drape_csv_put_text(file, events[point->event]);
+        drape_csv_put_numbers(file, 4,
+                              (double[]){point->factor, point->arc, point->elastic, point->potential});
+        drape_csv_put_integer(file, point->unstable);
+        drape_csv_put_integer(file, point->iterations);
+        drape_csv_put_numbers(file, 2, (double[]){point->residual, displacement});
+        for (size_t i = 0; i < 3 * j->request->nodes.count; i++) {
+            const size_t number = 3 * (size_t)j->node[i / 3] + i % 3;
+            drape_csv_put_number(file, x[number] - rest[number]);
+        }
+        drape_file_put_text(file, "\n");
+        status = drape_file_keep(file);
+    }
     if (!status && j->recorder)
         status = cli_shapes_emit(sim, point->number);
     if (point->number == 0)
         puts("point          factor  displacement     energy [J]  unstable  iterations  event");
     printf("%5" PRId64 "  %14.9g  %12.6g  %13.6g  %8" PRId64 "  %10d  %s\n", point->number, point->factor,
-           largest_displacement(j->in.model, drape_sim_positions(sim)), point->elastic + point->potential,
-           point->unstable, point->iterations, events[point->event]);
+           displacement, point->elastic + point->potential, point->unstable, point->iterations,
+           events[point->event]);
     return status;
 }
 
@@ -148,13 +134,20 @@ static int follow(job *j, const cli_state *state, drape_path_def *def)
 {
     const cli_command *command = &j->request->command;
     const cli_shapes shapes = {.folder = j->request->out, .table = TABLE, .frames = def->max_points};
+    char columns[64 + CLI_MAX_TEXTS * 64] =
+        "point,event,factor,arc,elastic,potential,unstable,iterations,residual,displacement";
+    size_t used = strlen(columns);
     drape_status status = cli_state_reach(state, &j->in);
     def->observer = observe;
     def->user = j;
     if (!status && shapes.folder)
         status = cli_shapes_open(command, &j->in, &shapes, &j->recorder);
+    for (size_t i = 0; i < j->request->nodes.count; i++)
+        used += (size_t)snprintf(columns + used, sizeof columns - used, ",u%d_x,u%d_y,u%d_z", (int)j->node[i],
+                                 (int)j->node[i], (int)j->node[i]);
+    snprintf(columns + used, sizeof columns - used, "\n");
     if (!status && j->recorder)
-        status = open_table(j);
+        status = drape_csv_open(j->in.ctx, drape_recorder_folder(j->recorder), TABLE, columns, &j->table);
     if (!status)
         status = drape_sim_path(j->in.sim, def);
     fflush(stdout);

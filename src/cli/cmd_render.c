@@ -1,5 +1,5 @@
 /* cmd_render.c: `drape render`: draws pictures and films of scenes and finished runs. */
-#include "cli/frames.h"
+#include "cli/cli.h"
 
 #include "io/export.h"
 #include "io/scene_copy.h"
@@ -7,7 +7,10 @@
 #include "render/images.h"
 #include "render/offscreen.h"
 #include "render/painter.h"
+#include "render/reel.h"
+#include "render/shading.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,6 +27,25 @@
 #define PICTURE_DIGITS 5    /* smallest number of digits in the name of a frame */
 #define PICTURE_NAME   32   /* upper bound of the bytes of "frame_00000.png" */
 
+/* Which frames are wanted. */
+typedef struct frames_def {
+    int every;                    /* every n-th frame; not used with `one` */
+    int one;                      /* number of a single frame, from 0; ALL_FRAMES; LAST_FRAME */
+    const drape_field_ops *field; /* NULL: none */
+} frames_def;
+
+enum { ALL_FRAMES = -1, LAST_FRAME = -2 };
+
+typedef struct source {
+    const cli_command *command;
+    const char *operand;
+    char label[80]; /* name shown in the picture */
+    cli_scene in;
+    drape_record run; /* of a folder; without frames: the scene is simulated */
+    drape_reel reel;  /* of its frames */
+    bool incomplete;  /* the simulation stopped early: the reel has the frames up to then */
+} source;
+
 typedef struct render_request {
     cli_command command;
     const char *out, *shade, *size, *camera, *range, *frame, *texture, *height, *environment;
@@ -33,7 +55,7 @@ typedef struct render_request {
 
 typedef struct render {
     const render_request *request;
-    cli_frames_def frames;
+    frames_def frames;
     int width, height;
     int fine;                        /* pixels that are drawn along a side of one of the picture */
     double azimuth, elevation, zoom; /* of the camera */
@@ -42,7 +64,7 @@ typedef struct render {
     bool film, picture;   /* to be made; neither: a folder of pictures */
     drape_folder *folder; /* of pictures; NULL: there is one picture or a film */
     drape_film *making;   /* NULL: it is not begun */
-    cli_source *sources;
+    source *sources;
     int source_count;
     drape_context *ctx;
     drape_offscreen *offscreen;
@@ -178,7 +200,7 @@ static int read_out(render *r)
 {
     const render_request *q = r->request;
     char *end = NULL;
-    long frame = q->frame ? strtol(q->frame, &end, 10) : CLI_LAST_FRAME;
+    long frame = q->frame ? strtol(q->frame, &end, 10) : LAST_FRAME;
     if (q->frame && (!*q->frame || *end || frame < 0 || frame > 1000000000))
         return cli_misuse("render", "--frame \"%.60s\": must be an integer, 0 or more", q->frame);
     if (q->frame && !r->picture)
@@ -197,9 +219,9 @@ static int read_out(render *r)
     r->fine = q->fine ? q->fine : r->picture ? 2 : 1;
     while (r->fine > 1 && (r->fine * r->width > DRAPE_MAX_PICTURE || r->fine * r->height > DRAPE_MAX_PICTURE))
         r->fine--;
-    r->frames = (cli_frames_def){.every = r->picture || !q->every ? 1 : q->every,
-                                 .one = r->picture ? (int)frame : CLI_ALL_FRAMES,
-                                 .field = r->shading->field};
+    r->frames = (frames_def){.every = r->picture || !q->every ? 1 : q->every,
+                             .one = r->picture ? (int)frame : ALL_FRAMES,
+                             .field = r->shading->field};
     return CLI_GO_ON;
 }
 
@@ -213,6 +235,140 @@ static int read_request(render *r)
     return code;
 }
 
+/* ---- Frames: of a finished run, or of a scene, which is simulated ---- */
+
+/* The label: "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
+static int open_source(const cli_command *command, const char *operand, const frames_def *def, source *out)
+{
+    const char *end = operand + strlen(operand), *begin;
+    *out = (source){.command = command, .operand = operand};
+    while (end > operand && end[-1] == '/')
+        end--;
+    for (begin = end; begin > operand && begin[-1] != '/'; begin--)
+        ;
+    if (end - begin > 5 && strncmp(end - 5, ".json", 5) == 0)
+        end -= 5;
+    snprintf(out->label, sizeof out->label, "%.*s", (int)(end - begin), begin);
+    int code = cli_is_folder(operand) ? cli_run_load(command, operand, &out->in, &out->run)
+                                      : cli_scene_load(command, operand, &out->in);
+    if (code != CLI_GO_ON)
+        return code;
+    if (out->run.frames > 0 && def->one >= out->run.frames)
+        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %" PRId64, def->one, operand,
+                          out->run.frames - 1);
+    if (out->run.frames > 0 && def->field && def->field->of_steps)
+        return cli_misuse(command->verb,
+                          "--shade %s: the frames of a run do not have it; give the scene, which is "
+                          "simulated again: %s/scene.json",
+                          def->field->entry.name, operand);
+    if (drape_reel_create(command->ctx, out->in.model, def->field, &out->reel))
+        return cli_report(command, CLI_BAD_INPUT);
+    return CLI_GO_ON;
+}
+
+/* ---- From a run ---- */
+
+/* Adds a frame to the reel. A field is that of the sim, set to the frame; it may need velocities: they are
+ * differences of the frames before and after it. scratch: (9 nodes) */
+static drape_status read_frame(const frames_def *def, source *s, int64_t frame, double *scratch)
+{
+    drape_record *run = &s->run;
+    const size_t n = 3 * (size_t)run->nodes;
+    const int64_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
+    const double span = run->times[after] - run->times[before];
+    double *x = scratch, *v = x + n, *other = v + n;
+    drape_status status = drape_record_read(run, frame, x);
+    if (!status && def->field)
+        status = drape_record_read(run, after, v);
+    if (!status && def->field)
+        status = drape_record_read(run, before, other);
+    for (size_t i = 0; !status && def->field && i < n; i++)
+        v[i] = span > 0 ? (v[i] - other[i]) / span : 0;
+    if (!status && def->field)
+        status = drape_sim_set_state(s->in.sim, run->times[frame], x, v);
+    return status ? status : drape_reel_add(&s->reel, run->times[frame], x, s->in.sim, def->field);
+}
+
+static int read_frames(const frames_def *def, source *s)
+{
+    double *scratch = drape_alloc(s->in.ctx, 9 * (size_t)s->run.nodes, sizeof *scratch);
+    drape_status status = scratch ? DRAPE_OK : DRAPE_E_MEMORY;
+    const bool all = def->one == ALL_FRAMES;
+    const int64_t end = s->run.frames - 1, first = all ? 0 : def->one == LAST_FRAME ? end : def->one;
+    for (int64_t i = first; i <= (all ? end : first) && !status && !cli_interrupted(); i += def->every)
+        status = read_frame(def, s, i, scratch);
+    drape_free(s->in.ctx, scratch);
+    if (cli_interrupted())
+        return cli_report_interrupted(s->command->verb);
+    return status ? cli_report(s->command, CLI_FAILED) : CLI_GO_ON;
+}
+
+/* ---- From a simulation ---- */
+
+typedef struct watch {
+    const frames_def *def;
+    source *source;
+    cli_progress progress;
+    double last; /* time of the last frame, kept or not [s] */
+    bool found;  /* the single frame that is wanted */
+} watch;
+
+static drape_status keep(watch *w, double t, const double *x)
+{
+    return drape_reel_add(&w->source->reel, t, x, w->source->in.sim, w->def->field);
+}
+
+static drape_status observe(void *user, const drape_event *event)
+{
+    watch *w = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT) {
+        cli_progress_show(&w->progress, event->sim);
+        if (!cli_interrupted())
+            return DRAPE_OK;
+        drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
+        return DRAPE_E_STOPPED;
+    }
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    w->last = event->time;
+    if (w->def->one == LAST_FRAME || (w->def->one >= 0 && event->frame != w->def->one) ||
+        event->frame % w->def->every != 0)
+        return DRAPE_OK;
+    drape_status status = keep(w, event->time, event->positions);
+    w->found = w->def->one >= 0;
+    return status ? status : w->found ? DRAPE_E_STOPPED : DRAPE_OK;
+}
+
+static int simulate(const frames_def *def, source *s)
+{
+    watch w = {.def = def, .source = s};
+    double end = drape_model_duration(s->in.model), t;
+    drape_status status = drape_sim_observe(s->in.sim, observe, &w);
+    cli_progress_begin(&w.progress, s->in.sim, end);
+    if (!status)
+        status = drape_sim_advance(s->in.sim, end);
+    cli_progress_clear(&w.progress);
+    if (status == DRAPE_E_STOPPED && drape_sim_stopped_by(s->in.sim) >= 0)
+        status = DRAPE_OK; /* as the scene says */
+    if (w.found)
+        return CLI_GO_ON;
+    s->incomplete = status != DRAPE_OK;
+    if (cli_interrupted())
+        return status == DRAPE_E_STOPPED ? cli_report(s->command, CLI_INTERRUPTED)
+                                         : cli_report_interrupted(s->command->verb);
+    if (status)
+        cli_report(s->command, CLI_FAILED);
+    if (status == DRAPE_E_ARGUMENT || status == DRAPE_E_MEMORY)
+        return CLI_FAILED;
+    t = drape_sim_time(s->in.sim); /* the state at the end is a frame too, unless it is the last one */
+    if ((def->one == LAST_FRAME || (def->one == ALL_FRAMES && (s->reel.count == 0 || t > w.last))) &&
+        keep(&w, t, drape_sim_positions(s->in.sim)))
+        return cli_report(s->command, CLI_FAILED);
+    if (s->reel.count > 0)
+        return CLI_GO_ON;
+    return cli_misuse(s->command->verb, "--frame %d: %s has fewer frames", def->one, s->operand);
+}
+
 /* ---- Preparing ---- */
 
 static int open_sources(render *r)
@@ -223,7 +379,7 @@ static int open_sources(render *r)
     if (!r->sources)
         return cli_report(&r->request->command, CLI_FAILED);
     for (int i = 0; i < command->operand_count && code == CLI_GO_ON; i++) {
-        code = cli_source_open(command, command->operands[i], &r->frames, &r->sources[i]);
+        code = open_source(command, command->operands[i], &r->frames, &r->sources[i]);
         r->source_count++;
     }
     return code;
@@ -251,7 +407,8 @@ static int fill_sources(render *r)
 {
     int code = CLI_GO_ON;
     for (int i = 0; i < r->source_count && code == CLI_GO_ON; i++)
-        code = cli_source_fill(&r->frames, &r->sources[i]);
+        code = r->sources[i].run.frames > 0 ? read_frames(&r->frames, &r->sources[i])
+                                            : simulate(&r->frames, &r->sources[i]);
     return code;
 }
 
@@ -314,7 +471,7 @@ static drape_status draw(render *r, size_t k)
     char caption[48];
     double t = r->sources[0].reel.times[k];
     for (int i = 0; i < r->source_count; i++) {
-        const cli_source *s = &r->sources[i];
+        const source *s = &r->sources[i];
         size_t at = i == 0 ? k : drape_reel_at(&s->reel, t);
         panels[i] = (drape_panel){.stage = &r->stages[i],
                                   .moment = {.t = s->reel.times[at],
@@ -471,7 +628,9 @@ static int run(const void *command)
     for (int i = 0; i < r.source_count; i++) {
         if (r.stages)
             drape_stage_free(&r.stages[i]);
-        cli_source_free(&r.sources[i]);
+        drape_reel_free(&r.sources[i].reel);
+        drape_record_close(&r.sources[i].run);
+        cli_scene_free(&r.sources[i].in);
     }
     drape_folder_close(&r.folder);
     drape_painter_destroy(&r.painter);

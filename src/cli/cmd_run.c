@@ -1,8 +1,6 @@
 /* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
 #include "cli/cli.h"
-#include "cli/progress.h"
 #include "cli/ranks.h"
-#include "cli/realtime.h"
 
 #include "base/clock.h"
 #include "base/hash.h"
@@ -12,15 +10,33 @@
 #include "io/recorder.h"
 #include "io/scene_copy.h"
 #include "io/summary.h"
+#include "model/scene.h"
 
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define MAX_WARNINGS 16
+#define METHOD       "newton_k"
+#define TRIALS       4    /* steps, of which the first sets up and the fastest other one counts */
+#define SHARE        0.5  /* of a frame that the iterations are to take: the rest is for contact to come */
+#define NODES_THREAD 2500 /* for each thread: with fewer it spends its time waiting */
+
+typedef struct realtime {
+    const cli_command *command;
+    drape_setting iterations; /* that were chosen */
+    bool iterations_given;    /* by the scene or the command line */
+    char chosen[400]; /* threads, method and iterations: what was chosen, and why, and what was given */
+    double *seconds;  /* (count) wall clock of each frame, in the command's arena */
+    size_t count, capacity;
+    drape_summary_realtime result;
+    bool estimates; /* the integrator estimates its error */
+} realtime;
 
 typedef struct run_request {
     cli_command command;
@@ -36,7 +52,7 @@ typedef struct run {
     char *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
-    cli_realtime realtime;            /* of --realtime */
+    realtime realtime;                /* of --realtime */
     double start;                     /* clock at the start minus the run time before the checkpoint [s] */
     double wall;                      /* duration of the run [s] */
     const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
@@ -53,6 +69,179 @@ static void note(run *r, drape_status status)
         return;
     r->status = status;
     snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->in.ctx));
+}
+
+/* ---- --realtime: frames within a budget of wall clock ---- */
+
+static void say(realtime *r, const char *format, ...) DRAPE_PRINTF(2, 3);
+static void say(realtime *r, const char *format, ...)
+{
+    const size_t used = strlen(r->chosen);
+    va_list values;
+    va_start(values, format);
+    if (used > 0)
+        snprintf(r->chosen + used, sizeof r->chosen - used, "; ");
+    const size_t at = strlen(r->chosen);
+    vsnprintf(r->chosen + at, sizeof r->chosen - at, format, values);
+    va_end(values);
+}
+
+/* Seconds of the steps of a frame with one iteration each, whatever number the trial steps make; 0 if they
+ * are not known, because a step failed. */
+static double try_steps(const cli_scene *scene, const drape_sim_def *def)
+{
+    const double frame = 1 / drape_model_frame_rate(scene->model);
+    drape_sim *sim = NULL;
+    double best = INFINITY, dt = frame;
+    drape_status status = drape_sim_create(scene->ctx, scene->model, def, &sim);
+    if (!status)
+        dt = drape_chosen_integrator_value(&sim->chosen, "dt", frame);
+    for (int i = 0; !status && i < TRIALS && !cli_interrupted(); i++) {
+        const double start = drape_clock_seconds();
+        const int64_t before = drape_sim_statistics(sim).newton_iterations;
+        status = drape_sim_advance(sim, drape_sim_time(sim) + dt);
+        const int64_t made = drape_sim_statistics(sim).newton_iterations - before;
+        best = i > 0 ? fmin(best, (drape_clock_seconds() - start) / fmax(1, (double)made)) : best;
+    }
+    drape_sim_destroy(&sim);
+    return status || isinf(best) ? 0 : best * fmax(1, ceil(frame / dt - 1e-9));
+}
+
+/* One or two iterations are the least number: further ones follow where the estimated error asks for them and
+ * there is time. */
+static drape_status choose_method(realtime *r, const cli_scene *scene, drape_sim_def *def)
+{
+    const double budget = 1 / drape_model_frame_rate(scene->model);
+    char text[16];
+    def->integrator = METHOD;
+    say(r, "method %s: chosen, as none is named", METHOD);
+    drape_status status = drape_scene_set(scene->scene, "/integrator/method", "\"" METHOD "\"");
+    if (status || r->iterations_given)
+        return status;
+    r->iterations = (drape_setting){.name = "iterations", .number = 1};
+    def->integrator_settings = &r->iterations;
+    def->integrator_setting_count = 1;
+    const double seconds = try_steps(scene, def);
+    const int count = seconds > 0 && 2 * seconds <= SHARE * budget ? 2 : 1;
+    r->iterations.number = count;
+    snprintf(text, sizeof text, "%d", count);
+    if (seconds > 0)
+        say(r, "iterations %d: chosen, as one takes %.3g ms of a frame of %.4g ms in trial steps%s", count,
+            1e3 * seconds, 1e3 * budget, seconds > budget ? "; frames will be late" : "");
+    else
+        say(r, "iterations %d: chosen, as a trial step failed", count);
+    return drape_scene_set(scene->scene, "/integrator/iterations", text);
+}
+
+/* A cli_choose. Unless the scene or the command line names a method, chooses newton_k, with as many
+ * iterations as a few trial steps show to fit into half of a frame, and as many threads as the machine has
+ * processors and the mesh thousands of nodes for, unless they are given. The method is set in the scene, too,
+ * so that its copy runs again alike. An option that only some methods have stands for the scene's own, as one
+ * that is named does. */
+static drape_status choose_realtime(void *user, const cli_scene *scene, drape_sim_def *def)
+{
+    realtime *r = user;
+    const long there = sysconf(_SC_NPROCESSORS_ONLN), nodes = drape_model_node_count(scene->model),
+               most = 1 + nodes / NODES_THREAD;
+    bool named = drape_scene_gives(scene->scene, "/integrator/method");
+    for (size_t i = 0; i < r->command->setting_count; i++)
+        named = named || r->command->settings[i].must_act;
+    r->iterations_given = drape_scene_gives(scene->scene, "/integrator/iterations");
+    if (r->command->threads) {
+        say(r, "threads %d: given", def->threads);
+    } else {
+        def->threads = (int)fmax(1, fmin(fmin((double)there, (double)most), 256));
+        say(r, "threads %d: chosen, for %ld nodes and %ld processor%s", def->threads, nodes, there,
+            there > 1 ? "s" : "");
+    }
+    if (!named)
+        return choose_method(r, scene, def);
+    say(r, "method %s: given by the scene or an option", scene->model->integrator.type);
+    return DRAPE_OK;
+}
+
+static void count(drape_summary_realtime *s, const drape_realtime *frame)
+{
+    bool full = strcmp(frame->level, "full") == 0, fewer = strcmp(frame->level, "fewer iterations") == 0;
+    s->frames++;
+    s->missed += !frame->kept;
+    s->full += full;
+    s->fewer += fewer;
+    s->larger += !full && !fewer;
+    s->inaccurate += frame->error > frame->error_bound;
+    s->crossings = frame->crossings > s->crossings ? frame->crossings : s->crossings;
+    s->still += !(frame->h > 0);
+    s->debt = frame->debt;
+    s->dropped = frame->dropped_total;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* By the nearest rank; of sorted times. */
+static double percentile(const realtime *r, double share)
+{
+    size_t rank = (size_t)ceil(share * (double)r->count);
+    return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
+}
+
+/* Advances in frames of 1 / frame_rate up to the scene's duration, each with that time as its budget, without
+ * sleeping. Late frames are not failures. The status is that of the advance. */
+static drape_status run_realtime(realtime *r, const cli_scene *scene)
+{
+    double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
+    const drape_chosen *chosen = &scene->sim->chosen;
+    const double number = drape_chosen_integrator_value(chosen, "iterations", NAN);
+    drape_status status = DRAPE_OK;
+    r->result.budget = frame;
+    if (!r->iterations.name && isnan(number)) /* not chosen */
+        say(r, "iterations: not a parameter of %s", chosen->integrator->entry.name);
+    else if (!r->iterations.name)
+        say(r, "iterations %.0f: %s", number, r->iterations_given ? "given" : "the default of the method");
+    while (!status && end - drape_sim_time(scene->sim) - r->result.debt > 1e-9 * frame) {
+        drape_realtime report;
+        double left = end - drape_sim_time(scene->sim) - r->result.debt;
+        status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
+        count(&r->result, &report);
+        r->estimates = !isnan(report.error_bound);
+        if (r->count == r->capacity) {
+            r->capacity = r->capacity ? 2 * r->capacity : 256;
+            double *more = drape_arena_resize(r->command->arena, r->seconds, r->capacity, sizeof *more);
+            if (!more)
+                return status ? status : DRAPE_E_MEMORY;
+            r->seconds = more;
+        }
+        r->seconds[r->count++] = report.seconds;
+    }
+    if (!status) /* the debt of the last frames, without a deadline */
+        status = drape_sim_advance(scene->sim, end);
+    if (r->count > 0)
+        qsort(r->seconds, r->count, sizeof *r->seconds, compare);
+    r->result.p50 = percentile(r, 0.5);
+    r->result.p95 = percentile(r, 0.95);
+    r->result.p99 = percentile(r, 0.99);
+    r->result.worst = percentile(r, 1);
+    return status;
+}
+
+static void print_realtime(const realtime *r)
+{
+    const drape_summary_realtime *s = &r->result;
+    printf("chosen    %s\n", r->chosen);
+    printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
+           (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
+           (long long)s->missed);
+    printf("levels    %lld frames with all iterations, %lld with fewer, %lld with longer steps; "
+           "%lld frames without a new state; %.4g s of simulated time dropped; %.4g s owed at the last "
+           "frame\n",
+           (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->dropped,
+           s->debt);
+    if (r->estimates)
+        printf("accuracy  %lld frames with a step above the bound on its estimated error\n",
+               (long long)s->inaccurate);
 }
 
 /* ---- Output ---- */
@@ -202,23 +391,6 @@ static int open_output(run *r)
 
 /* ---- Results on stdout ---- */
 
-static void print_energy(const run *r)
-{
-    drape_energy e = drape_sim_energy(r->in.sim);
-    const struct {
-        const char *name;
-        double value;
-    } parts[] = {{"kinetic", e.kinetic}, {"elastic", e.elastic},       {"gravity", e.gravity},
-                 {"contact", e.contact}, {"dissipated", e.dissipated}, {"numerical", e.numerical}};
-    fputs("energy   ", stdout);
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (isnan(parts[i].value)) /* a start that collapses elements */
-            printf("%s %s undefined", i ? "," : "", parts[i].name);
-        else
-            printf("%s %s %.5g J", i ? "," : "", parts[i].name, parts[i].value);
-    fputc('\n', stdout);
-}
-
 /* One line for each event: how often it occurred, and when. */
 static void print_events(const run *r)
 {
@@ -308,14 +480,17 @@ static void print_results(run *r)
 {
     const drape_model *model = r->in.model;
     const drape_statistics s = drape_sim_statistics(r->in.sim);
+    const drape_energy e = drape_sim_energy(r->in.sim);
     const struct {
         const char *name;
-        double seconds;
+        double value;
     } parts[] = {{"residual", s.wall_residual},
                  {"Jacobian", s.wall_jacobian},
                  {"factor", s.wall_factor},
                  {"solve", s.wall_solve},
-                 {"contact", s.wall_contact}};
+                 {"contact", s.wall_contact}},
+      energies[] = {{"kinetic", e.kinetic}, {"elastic", e.elastic},       {"gravity", e.gravity},
+                    {"contact", e.contact}, {"dissipated", e.dissipated}, {"numerical", e.numerical}};
     printf("status    %s\n", drape_status_name(r->status));
     printf("model     %d nodes, %lld degrees of freedom, %lld nonzeros\n", (int)drape_model_node_count(model),
            (long long)drape_model_dof_count(model), (long long)drape_model_nonzero_count(model));
@@ -325,7 +500,13 @@ static void print_results(run *r)
     if (s.stability_known)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
                (long long)s.unstable_modes);
-    print_energy(r);
+    fputs("energy   ", stdout);
+    for (size_t i = 0; i < sizeof energies / sizeof *energies; i++)
+        if (isnan(energies[i].value)) /* a start that collapses elements */
+            printf("%s %s undefined", i ? "," : "", energies[i].name);
+        else
+            printf("%s %s %.5g J", i ? "," : "", energies[i].name, energies[i].value);
+    fputc('\n', stdout);
     print_events(r);
     print_untangling(r);
     if (!model->part)
@@ -333,12 +514,12 @@ static void print_results(run *r)
     printf("wall      %.4g s; %.4g ms a step", r->wall,
            s.steps_accepted ? 1e3 * s.wall_steps / (double)s.steps_accepted : 0.0);
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        if (parts[i].seconds > 0)
+        if (parts[i].value > 0)
             printf("%s %s %.0f %%", i ? "," : ":", parts[i].name,
-                   100 * parts[i].seconds / (s.wall_steps > 0 ? s.wall_steps : 1));
+                   100 * parts[i].value / (s.wall_steps > 0 ? s.wall_steps : 1));
     fputc('\n', stdout);
     if (r->request->realtime)
-        cli_realtime_print(&r->realtime);
+        print_realtime(&r->realtime);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
                (long long)drape_recorder_done(r->recorder).frames, CLI_SHOWN(r->request->out));
@@ -382,7 +563,7 @@ static void advance(run *r)
     cli_progress_begin(&r->progress, r->in.sim, end);
     cli_signals_cancel(r->in.sim);
     drape_status status =
-        r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
+        r->request->realtime ? run_realtime(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
@@ -481,7 +662,7 @@ static int load_and_run(const run_request *request)
     if (code != CLI_GO_ON)
         return code;
     code = cli_scene_load_with(&request->command, request->command.operand,
-                               request->realtime ? cli_realtime_choose : NULL, &r.realtime, &r.in);
+                               request->realtime ? choose_realtime : NULL, &r.realtime, &r.in);
     if (code == CLI_GO_ON)
         code = check_integrator(&r);
     if (code == CLI_GO_ON)

@@ -1,6 +1,5 @@
 /* cmd_validate.c: `drape validate`: measured against expected values, as a table, as Markdown, as JSON. */
 #include "cli/cli.h"
-#include "cli/progress.h"
 #include "lab/validate.h"
 
 #include "base/clock.h"
@@ -197,22 +196,6 @@ static drape_status run_cases(run *r, const validate_style *style, int counts[4]
     return status;
 }
 
-static int conclude(const run *r, const validate_request *request, drape_status status, const int counts[4])
-{
-    int done = 0;
-    for (int k = 0; k < 4; k++)
-        done += counts[k];
-    if (status == DRAPE_E_STOPPED) {
-        fprintf(stderr, "interrupted: %d of %zu cases are done%s\n", done, r->count,
-                request->out ? "; the same command resumes"
-                             : "; with --out DIR the same command would resume");
-        return CLI_INTERRUPTED;
-    }
-    if (status)
-        cli_print_message(&request->command, drape_context_message(r->ctx));
-    return status || counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED] ? CLI_FAILED : CLI_DONE;
-}
-
 static int run_references(drape_context *ctx, const validate_request *request, const drape_reference *only)
 {
     const validate_style *style = request->json       ? &json_style
@@ -232,8 +215,20 @@ static int run_references(drape_context *ctx, const validate_request *request, c
         fflush(stdout);
     }
     const drape_status closed = drape_file_close(&r.file);
-    const int code = status == DRAPE_E_ARGUMENT ? cli_report(&request->command, CLI_BAD_INPUT)
-                                                : conclude(&r, request, status ? status : closed, counts);
+    const int failed = counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED];
+    const int done = failed + counts[DRAPE_OUTCOME_PASS] + counts[DRAPE_OUTCOME_DOCUMENTED];
+    status = status ? status : closed;
+    int code = status || failed ? CLI_FAILED : CLI_DONE;
+    if (status == DRAPE_E_ARGUMENT) {
+        code = cli_report(&request->command, CLI_BAD_INPUT);
+    } else if (status == DRAPE_E_STOPPED) {
+        fprintf(stderr, "interrupted: %d of %zu cases are done%s\n", done, r.count,
+                request->out ? "; the same command resumes"
+                             : "; with --out DIR the same command would resume");
+        code = CLI_INTERRUPTED;
+    } else if (status) {
+        cli_print_message(&request->command, drape_context_message(ctx));
+    }
     drape_file_destroy(&r.file);
     drape_folder_close(&r.folder);
     drape_free(ctx, r.records);

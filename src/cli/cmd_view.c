@@ -1,12 +1,13 @@
 /* cmd_view.c: `drape view`: a window that shows a running scene, which can be changed: models are constant,
  * so a change sets a value of the scene, compiles a new model, and sets a new sim to the former state. */
-#include "cli/frames.h"
+#include "cli/cli.h"
 
 #include "base/clock.h"
 #include "model/scene.h"
 #include "model/track.h"
 #include "render/painter.h"
 #include "render/reel.h"
+#include "render/shading.h"
 #include "render/window.h"
 
 #include <math.h>

@@ -2,7 +2,6 @@
 #include "cli/lab.h"
 
 #include "base/arena.h"
-#include "cli/progress.h"
 #include "drape/lab.h"
 
 #include <limits.h>

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "base/param.h"
+#include "render/shading.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -13,6 +14,8 @@
 #define MAX_OPTIONS 40
 #define FIRST_VALUE 256 /* the value that getopt_long returns for option 0: above all characters */
 #define HELP_VALUE  'h'
+
+#define DEFAULT_SHADE "linen"
 
 /* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
 static const cli_option scene_options[] = {
@@ -143,6 +146,16 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
     return cli_misuse(verb->entry.name, "there is no option \"%.60s\"; `drape %s --help` shows all%s%s%s",
                       given, verb->entry.name, meant ? "; did you mean \"--" : "", meant ? meant : "",
                       meant ? "\"?" : "");
+}
+
+int cli_find_shading(const cli_command *command, const char *name, int *index)
+{
+    char text[DRAPE_UNKNOWN_SIZE];
+    *index = drape_registry_find(&drape_shading_registry, NULL, name ? name : DEFAULT_SHADE);
+    if (*index >= 0)
+        return CLI_GO_ON;
+    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+    return cli_misuse(command->verb, "--shade: %s", text);
 }
 
 /* ---- Values ---- */

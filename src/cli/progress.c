@@ -1,6 +1,6 @@
-/* progress.c: see progress.h. It only uses carriage returns and blanks, no colours or control sequences, so
- * NO_COLOR and dumb terminals need no special case. */
-#include "cli/progress.h"
+/* progress.c: the line on the terminal. It only uses carriage returns and blanks, no colours or control
+ * sequences, so NO_COLOR and dumb terminals need no special case. */
+#include "cli/cli.h"
 
 #include "base/clock.h"
 

@@ -78,15 +78,6 @@ static void add_text(void *user, const char *text, size_t size)
     *hash = drape_hash_bytes(*hash, text, size);
 }
 
-/* All that a scene says, with the meshes that it names. */
-static uint64_t hash_of(const cli_scene *s)
-{
-    uint64_t hash = DRAPE_HASH_START;
-    drape_scene_print(s->scene, add_text, &hash);
-    const uint64_t model = drape_model_identity(s->model);
-    return drape_hash_bytes(hash, &model, sizeof model);
-}
-
 drape_status cli_ranks_share(drape_status status, cli_scene *s)
 {
     if (!ranks)
@@ -99,7 +90,11 @@ drape_status cli_ranks_share(drape_status status, cli_scene *s)
         be_silent();
     if (from >= 0)
         return (drape_status)agreed;
-    if (!drape_mpi_is_same(ranks, hash_of(s)))
+    /* all that a scene says, with the meshes that it names */
+    const uint64_t model = drape_model_identity(s->model);
+    uint64_t hash = DRAPE_HASH_START;
+    drape_scene_print(s->scene, add_text, &hash);
+    if (!drape_mpi_is_same(ranks, drape_hash_bytes(hash, &model, sizeof model)))
         return drape_fail(
             s->ctx, DRAPE_E_ARGUMENT,
             "the ranks do not have the same scene: each reads it, and the meshes that it names, "

@@ -299,21 +299,14 @@ bool cli_is_one_of(const drape_scene_object *form, const drape_scene_key *key)
     return false;
 }
 
-/* Whether a key is excluded because an alternative to it was chosen. */
-static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)
-{
-    for (int i = 0; chosen && object->one_of && object->one_of[i]; i++)
-        if (strcmp(object->one_of[i], name) == 0)
-            return strcmp(name, chosen) != 0;
-    return false;
-}
-
+/* chosen: the one of the alternatives that is given, which excludes the others; NULL: none is. */
 static json_t *properties_of(const drape_scene_object *object, const char *chosen)
 {
     json_t *properties = json_object();
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        if (!is_excluded(object, key->param.name, chosen))
+        const bool excluded = chosen && cli_is_one_of(object, key) && strcmp(key->param.name, chosen) != 0;
+        if (!excluded)
             properties = drape_json_with(properties, key->param.name,
                                          described(key_value(object, key), key, cli_is_one_of(object, key)));
     }
@@ -376,19 +369,6 @@ static json_t *entries_schema(const drape_scene_object *object, const struct ope
     return json_pack("{s:o}", "anyOf", forms);
 }
 
-/* Parameters of all entries of the table; for a table of one entry without a name, its own. */
-static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
-{
-    json_t *properties = properties_of(object, NULL), *required = required_of(object);
-    const drape_entry *entry;
-    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++) {
-        properties = with_params(properties, entry);
-        if (opening->kind == ENTRY_PARAMS)
-            required = with_required(required, entry);
-    }
-    return closed(properties, required);
-}
-
 /* The first choice of the preset, "none", means that no preset is used. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
@@ -411,8 +391,13 @@ static json_t *object_schema(const drape_scene_object *object)
     const struct opening *opening = object->open ? opening_of(object) : NULL;
     if (opening && opening->kind == ENTRY_PARAMS && opening->key)
         return entries_schema(object, opening);
-    json_t *schema =
-        opening ? table_schema(object, opening) : closed(properties_of(object, NULL), required_of(object));
+    json_t *properties = properties_of(object, NULL), *required = required_of(object);
+    for (int i = 0; opening && opening->table->entries[i]; i++) { /* parameters of all entries of the table */
+        properties = with_params(properties, opening->table->entries[i]);
+        if (opening->kind == ENTRY_PARAMS) /* of a table of one entry without a name */
+            required = with_required(required, opening->table->entries[i]);
+    }
+    json_t *schema = closed(properties, required);
     const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;
     if (opening && opening->preset)
         return with_preset(schema, opening);

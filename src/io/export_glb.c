@@ -768,19 +768,6 @@ static drape_status write_first(glb_state *glb)
     return drape_file_publish(&glb->file);
 }
 
-static drape_status write_next(glb_state *glb)
-{
-    const off_t before = glb->file.kept;
-    put_frame(glb);
-    drape_status status = drape_file_keep(&glb->file);
-    if (status)
-        return status;
-    if (write_lengths(glb, (glb->frames + 1) * glb->frame_bytes))
-        drape_file_cut(&glb->file, before);
-    fill_frame(glb);
-    return glb->status;
-}
-
 /* The times of an animation must strictly increase, in float32. */
 static drape_status glb_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
@@ -796,9 +783,20 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     glb->status = DRAPE_OK;
     keep_places(glb, frame);
     find_differences(glb, frame);
-    drape_status status = glb->frames == 0 ? write_first(glb) : write_next(glb);
-    if (!status)
-        glb->frames++;
+    drape_status status;
+    if (glb->frames == 0) {
+        status = write_first(glb);
+    } else {
+        const off_t before = glb->file.kept;
+        put_frame(glb);
+        status = drape_file_keep(&glb->file);
+        if (!status && write_lengths(glb, (glb->frames + 1) * glb->frame_bytes))
+            drape_file_cut(&glb->file, before);
+        if (!status)
+            fill_frame(glb);
+        status = status ? status : glb->status;
+    }
+    glb->frames += !status;
     return status;
 }
 

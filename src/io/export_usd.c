@@ -273,22 +273,6 @@ static void put_subset(usd_state *usd, drape_file *file, const drape_faces *face
     drape_file_put_text(file, "}\n");
 }
 
-/* A corner without texture coordinates, beside others with some, has (0, 0), which is added to them. */
-static void put_uvs(drape_file *file, const drape_faces *faces)
-{
-    if (faces->uv_count == 0)
-        return;
-    drape_file_put_text(file, "texCoord2f[] primvars:st = [");
-    for (size_t i = 0; i < (size_t)faces->uv_count; i++)
-        drape_file_print(file, "(%.9g, %.9g), ", (double)(float)faces->uv[2 * i],
-                         (double)(float)faces->uv[2 * i + 1]);
-    drape_file_put_text(file, "(0, 0)] (\ninterpolation = \"faceVarying\"\n)\nint[] primvars:st:indices = [");
-    for (int32_t c = 0; c < faces->corner_count; c++)
-        drape_file_print(file, "%s%" PRId32, c ? ", " : "",
-                         faces->uv_of[c] < 0 ? faces->uv_count : faces->uv_of[c]);
-    drape_file_put_text(file, "]\n");
-}
-
 static void put_triangles(drape_file *file, const int32_t *triangle, int32_t count)
 {
     drape_file_put_text(file, "int[] faceVertexCounts = [");
@@ -313,7 +297,19 @@ static void put_cloth(usd_state *usd, drape_file *file, const object *o)
         drape_file_print(file, "%s%" PRId32, f ? ", " : "", faces->first[f + 1] - faces->first[f]);
     drape_file_put_text(file, "]\n");
     put_numbers(file, "int[] faceVertexIndices", faces->node, (size_t)faces->corner_count);
-    put_uvs(file, faces);
+    if (faces->uv_count > 0) {
+        /* a corner without texture coordinates, beside others with some, has (0, 0), which is added */
+        drape_file_put_text(file, "texCoord2f[] primvars:st = [");
+        for (size_t i = 0; i < (size_t)faces->uv_count; i++)
+            drape_file_print(file, "(%.9g, %.9g), ", (double)(float)faces->uv[2 * i],
+                             (double)(float)faces->uv[2 * i + 1]);
+        drape_file_put_text(file,
+                            "(0, 0)] (\ninterpolation = \"faceVarying\"\n)\nint[] primvars:st:indices = [");
+        for (int32_t c = 0; c < faces->corner_count; c++)
+            drape_file_print(file, "%s%" PRId32, c ? ", " : "",
+                             faces->uv_of[c] < 0 ? faces->uv_count : faces->uv_of[c]);
+        drape_file_put_text(file, "]\n");
+    }
     if (faces->material_count > 0)
         drape_file_put_text(file,
                             "uniform token subsetFamily:materialBind:familyType = \"nonOverlapping\"\n");
@@ -354,10 +350,7 @@ static void put_matrix(drape_file *file, const drape_collider_pose *pose)
 }
 
 /* Beside the transformation itself, also if that is in a file of its own. */
-static void put_order(drape_file *file)
-{
-    drape_file_put_text(file, "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n");
-}
+static const char order[] = "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n";
 
 /* ---- What changes ---- */
 
@@ -417,7 +410,7 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
         o->extent = place(&o->file);
         drape_file_print(&o->file, "%s\npoint3f[] points.timeSamples = {\n", text);
     } else {
-        put_order(&o->file);
+        drape_file_put_text(&o->file, order);
         drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
     }
     put_sample(usd, o, frame, usd->code);
@@ -481,7 +474,7 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
         const object *o = &usd->object[i];
         begin_mesh(usd, file, o);
         if (!o->changes) {
-            put_order(file);
+            drape_file_put_text(file, order);
             drape_file_put_text(file, "matrix4d xformOp:transform = ");
             put_matrix(file, &frame->poses[o->body]);
             drape_file_put_text(file, "\n");
@@ -490,26 +483,6 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
     }
     begin_mesh(usd, file, first);
     put_samples(usd, first, frame);
-}
-
-/* positions.usda appears last: it refers to the others. */
-static drape_status write_first(usd_state *usd, const drape_frame *frame)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t i = usd->objects - 1; i >= 0 && !status; i--) {
-        object *o = &usd->object[i];
-        if (!o->changes)
-            continue;
-        if (i == 0) {
-            put_stage(usd, frame);
-        } else {
-            put_metadata(usd, o, "mesh");
-            drape_file_put_text(&o->file, "def \"mesh\"\n{\n"); /* no type: alone it is not one to be drawn */
-            put_samples(usd, o, frame);
-        }
-        status = drape_file_publish(&o->file);
-    }
-    return status;
 }
 
 /* Writes extent and last time code over those before. */
@@ -551,17 +524,32 @@ static drape_status write_next(usd_state *usd, object *o, const drape_frame *fra
     return status;
 }
 
+/* positions.usda appears last: it refers to the others. */
 static drape_status usd_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     usd_state *usd = state;
+    drape_status status = DRAPE_OK;
     (void)ctx;
     /* frames between have whole numbers; that at the end of a run may not */
     const double code = frame->time * usd->def->frame_rate, whole = floor(code + .5);
     usd->code = fabs(code - whole) < 1e-6 ? whole : code;
-    drape_status status = frame->index == 0 ? write_first(usd, frame) : DRAPE_OK;
-    for (int32_t i = usd->objects - 1; i >= 0 && frame->index > 0 && !status; i--)
-        if (usd->object[i].changes)
-            status = write_next(usd, &usd->object[i], frame);
+    for (int32_t i = usd->objects - 1; i >= 0 && !status; i--) {
+        object *o = &usd->object[i];
+        if (!o->changes)
+            continue;
+        if (frame->index > 0) {
+            status = write_next(usd, o, frame);
+            continue;
+        }
+        if (i == 0) {
+            put_stage(usd, frame);
+        } else {
+            put_metadata(usd, o, "mesh");
+            drape_file_put_text(&o->file, "def \"mesh\"\n{\n"); /* no type: alone it is not one to be drawn */
+            put_samples(usd, o, frame);
+        }
+        status = drape_file_publish(&o->file);
+    }
     return status;
 }
 

@@ -449,9 +449,10 @@ static drape_status allocate_arrays(drape_recorder *r)
     const drape_render_surface *s = &model->surface;
     const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
     const size_t shown = (size_t)s->node_count, faces = (size_t)s->triangle_count;
-    bool rotates = false;
+    bool rotates = false, bodies = false;
     for (size_t i = 0; i < r->output_count; i++) {
         r->wants_fields = r->wants_fields || r->outputs[i].ops->wants_fields;
+        bodies = bodies || r->outputs[i].ops->wants_bodies;
         rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
         r->gathers = r->gathers || (r->ranks && !is_shared(r, &r->outputs[i]));
     }
@@ -472,17 +473,8 @@ static drape_status allocate_arrays(drape_recorder *r)
         if (r->shown_triangle)
             drape_render_triangles(model, r->shown_triangle);
     }
-    return drape_arena_status(&r->arena);
-}
-
-static drape_status make_bodies(drape_recorder *r)
-{
-    const drape_model *model = r->model;
-    bool wanted = false;
-    for (size_t i = 0; i < r->output_count; i++)
-        wanted = wanted || r->outputs[i].ops->wants_bodies;
-    if (!wanted || model->collider_count == 0)
-        return DRAPE_OK;
+    if (!bodies || model->collider_count == 0)
+        return drape_arena_status(&r->arena);
     r->body_count = (size_t)model->collider_count;
     r->point_count = drape_export_points(model);
     r->poses = drape_arena_take(&r->arena, 2 * r->body_count, sizeof *r->poses);
@@ -670,8 +662,6 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
     drape_status status = choose_outputs(r, def);
     if (!status)
         status = allocate_arrays(r);
-    if (!status)
-        status = make_bodies(r);
     if (!status && r->progress.writes)
         status = open_folder(r, def);
     if (!status && a) {
