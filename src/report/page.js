@@ -57,7 +57,12 @@ function show() {
 }
 
 function tick(now) {
-  if (moved) layOut();
+  if (moved) {
+    const width = Math.max(280, Math.round(element('plots').clientWidth));
+    for (const plot of plots) plot.render(width);
+    moved = false;
+    stale = true;
+  }
   if (state.playing && last !== null) {
     const time = state.time + state.rate * Math.min(now - last, 250) / 1000;
     seek(time > run.end ? run.begin : time);
@@ -68,13 +73,6 @@ function tick(now) {
     show();
   }
   requestAnimationFrame(tick);
-}
-
-function layOut() {
-  const width = Math.max(280, Math.round(element('plots').clientWidth));
-  for (const plot of plots) plot.render(width);
-  moved = false;
-  stale = true;
 }
 
 // ---- Texts

@@ -135,7 +135,8 @@ class Player {
     if (strain[0] > -1e-3 * strain[1]) strain[0] = 0;
     this.ranges.speed[0] = 0;
     this.makeProgram();
-    this.makeCloth();
+    this.cloth = this.makeMesh([[3, this.positions], [3, this.normals], [1, this.values]], run.corners);
+    this.pins = this.elements(new Uint32Array(run.pinned));
     this.makeColliders();
     this.resetView();
   }
@@ -164,7 +165,7 @@ class Player {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  // Buffers by name, with the numbers of each vertex.
+  // Buffers by number, with the numbers of each vertex.
   makeMesh(arrays, corners) {
     const gl = this.gl, mesh = { vertices: gl.createVertexArray(), buffers: [], count: corners.length };
     gl.bindVertexArray(mesh.vertices);
@@ -186,12 +187,7 @@ class Player {
     gl.bindVertexArray(this.cloth.vertices);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
-    return { buffer, count: corners.length };
-  }
-
-  makeCloth() {
-    this.cloth = this.makeMesh([[3, this.positions], [3, this.normals], [1, this.values]], run.corners);
-    this.pins = this.elements(new Uint32Array(run.pinned));
+    return { vertices: this.cloth.vertices, corners: buffer, count: corners.length };
   }
 
   makeColliders() {
@@ -273,7 +269,7 @@ class Player {
     return { offset: along(sub(offset, rotated(rotation, collider.pivot)), 1, collider.pivot), rotation };
   }
 
-  draw(mesh, { kind, front = [0, 0, 0], back = front, alpha = 1, offset = [0, 0, 0], rotation = [0, 0, 0, 1] }) {
+  draw(mesh, { kind, mode = this.gl.TRIANGLES, front = [0, 0, 0], back = front, alpha = 1, offset = [0, 0, 0], rotation = [0, 0, 0, 1] }) {
     const gl = this.gl;
     gl.bindVertexArray(mesh.vertices);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.corners);
@@ -283,19 +279,7 @@ class Player {
     gl.uniform1f(this.at.alpha, alpha);
     gl.uniform3fv(this.at.offset, offset);
     gl.uniform4fv(this.at.rotation, rotation);
-    gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
-  }
-
-  drawElements(list, mode, kind, front, alpha) {
-    const gl = this.gl;
-    gl.bindVertexArray(this.cloth.vertices);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, list.buffer);
-    gl.uniform1i(this.at.kind, kind);
-    gl.uniform3fv(this.at.front, front);
-    gl.uniform1f(this.at.alpha, alpha);
-    gl.uniform3fv(this.at.offset, [0, 0, 0]);
-    gl.uniform4f(this.at.rotation, 0, 0, 0, 1);
-    gl.drawElements(mode, list.count, gl.UNSIGNED_INT, 0);
+    gl.drawElements(mode, mesh.count, gl.UNSIGNED_INT, 0);
   }
 
   // Shadows: everything above a plane darkens it, each pixel once.
@@ -349,7 +333,7 @@ class Player {
     this.draw(this.cloth, shade === 'plain' ? { kind: 0, front: [0.72, 0.2, 0.17], back: [0.86, 0.62, 0.4] } : { kind: 1 });
     gl.disable(gl.POLYGON_OFFSET_FILL);
     if (edges) this.edges ??= this.elements(edgesOf(run.corners)); // made when needed: a large mesh has many
-    if (edges) this.drawElements(this.edges, gl.LINES, 2, [0.05, 0.05, 0.08], 0.45);
-    if (this.pins.count) this.drawElements(this.pins, gl.POINTS, 3, [0.1, 0.75, 0.85], 1);
+    if (edges) this.draw(this.edges, { kind: 2, mode: gl.LINES, front: [0.05, 0.05, 0.08], alpha: 0.45 });
+    if (this.pins.count) this.draw(this.pins, { kind: 3, mode: gl.POINTS, front: [0.1, 0.75, 0.85] });
   }
 }

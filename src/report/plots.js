@@ -179,13 +179,8 @@ class Plot {
 }
 
 function valueAt({ t, y, steps }, time) {
-  let low = 0, high = t.length - 1;
-  if (high < 0) return null;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (t[middle] <= time) low = middle;
-    else high = middle - 1;
-  }
+  if (t.length === 0) return null;
+  const low = lastOf(t, time);
   if (steps || low + 1 >= t.length || y[low] === null || y[low + 1] === null || time <= t[low]) return y[low];
   return y[low] + (y[low + 1] - y[low]) * (time - t[low]) / (t[low + 1] - t[low]);
 }
@@ -202,12 +197,6 @@ function energyPlot() {
     .map(([name, y], i) => ({ name, y, t: c.t_state, color: `var(--c${i})` }))
     .filter(({ y }) => y.some((x) => x));
   return new Plot({ title: 'Energy', unit: 'J', series });
-}
-
-function attempts() {
-  const c = run.steps.columns, good = [], bad = [];
-  for (let i = 0; i < c.t.length; i++) (c.accepted[i] ? good : bad).push(i);
-  return { c, good, bad };
 }
 
 function stepPlot({ c, good, bad }) {
@@ -237,6 +226,7 @@ function rejectionPlot({ c, bad }) {
 }
 
 function makePlots() {
-  const all = attempts();
+  const c = run.steps.columns, good = [], bad = [], all = { c, good, bad };
+  for (let i = 0; i < c.t.length; i++) (c.accepted[i] ? good : bad).push(i);
   return [energyPlot(), stepPlot(all), iterationPlot(all), rejectionPlot(all)].filter((plot) => plot);
 }

@@ -30,39 +30,33 @@
 
 #define DEFAULT_NAME "report.html"
 #define LEVELS       65535
+#define BLOCK        "<script type=\"text/plain\" id=\"%s\">"
+#define BLOCK_END    "</script>\n"
 #define MAX_ROWS     20000 /* of a table in the page */
 #define SCENE_LIMIT  ((off_t)64 << 20)
 
 /* ---- What the page shows: numbers and texts as JSON, frames as 16-bit integers in base64 ---- */
 
-/* What a page is made from: the frames and tables of a run, its scene, compiled again, and its summary. */
-typedef struct run_source {
-    drape_context *ctx;
-    drape_record record;
-    drape_model *model;
-    char *scene_text;
-    json_t *summary; /* NULL: the run did not end */
-} run_source;
-
-/* A field at the nodes of the surface that frames show, which is a render mesh where a cloth has one, in all
- * kept frames: the integer i stands for low + i step. */
+/* A quantity in all kept frames, a block of the page: the integer i stands for low + i step. The first ones
+ * are at the nodes of the surface that frames show, which is a render mesh where a cloth has one; then follow
+ * the points of each collider that deforms, in its own coordinates. */
 typedef struct page_field {
-    const char *name, *unit;
-    int width; /* numbers per node */
-    double low[3], step[3];
+    char name[24];
+    const char *unit;
+    int width;        /* numbers per node or point */
+    size_t count;     /* numbers in a frame */
+    int32_t collider; /* -1: none */
+    double low[3], high[3], step[3];
 } page_field;
 
 #define FIELDS 3 /* positions, strain, speed */
 
-/* The points of a collider that deforms, in its own coordinates, as such a field. */
-typedef struct page_body {
-    int32_t collider;
-    char block[24]; /* the name of its block in the page */
-    page_field field;
-} page_body;
-
-typedef struct page_data {
-    const run_source *run;
+typedef struct page {
+    drape_context *ctx;
+    drape_record record; /* frames and tables of the run */
+    drape_model *model;  /* its scene, compiled again */
+    char *scene_text;
+    json_t *summary;             /* NULL: the run did not end */
     drape_arena arena;           /* of all arrays */
     int64_t kept;                /* frames in the page */
     int64_t *frame;              /* (kept) their numbers */
@@ -72,28 +66,27 @@ typedef struct page_data {
     double *node_strain, *speed; /* (node_count) */
     double *normals;             /* (node_count x 3); NULL, as the next: no cloth has a render mesh */
     double *shown[FIELDS];       /* the fields of the loaded frame at the nodes of the surface */
-    page_field fields[FIELDS];
-    page_body *bodies; /* (body_count) */
-    int32_t body_count;
-    double *points; /* (of the largest body x 3) in the loaded frame */
-} page_data;
+    page_field *fields;          /* (field_count) */
+    int field_count;
+    double *points; /* (of the largest collider that deforms x 3) in the loaded frame */
+} page;
 
 /* ---- What is read ---- */
 
-static drape_status read_run(drape_context *ctx, const char *folder, run_source *source)
+static drape_status read_run(page *p, const char *folder)
 {
+    drape_context *ctx = p->ctx;
     char *scene, *text = NULL;
     size_t size = 0;
     json_error_t error = {0};
-    *source = (run_source){.ctx = ctx};
     drape_status status = drape_record_scene(ctx, folder, &scene);
     if (!status)
-        status = drape_file_read(ctx, scene, SCENE_LIMIT, &source->scene_text, &size);
+        status = drape_file_read(ctx, scene, SCENE_LIMIT, &p->scene_text, &size);
     if (!status)
-        status = drape_model_load(ctx, scene, &source->model);
+        status = drape_model_load(ctx, scene, &p->model);
     drape_free(ctx, scene);
     if (!status)
-        status = drape_record_open(ctx, folder, source->model->node_count, &source->record);
+        status = drape_record_open(ctx, folder, p->model->node_count, &p->record);
     char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
@@ -103,177 +96,142 @@ static drape_status read_run(drape_context *ctx, const char *folder, run_source 
     else if (errno != ENOENT) /* a run that was killed has none */
         status = DRAPE_E_FILE;
     if (text)
-        source->summary = drape_json_read(text, size, 0, &error);
-    if (text && !source->summary && json_error_code(&error) == json_error_out_of_memory)
+        p->summary = drape_json_read(text, size, 0, &error);
+    if (text && !p->summary && json_error_code(&error) == json_error_out_of_memory)
         status = drape_fail_memory(ctx, size);
     drape_free(ctx, text);
     drape_free(ctx, path);
     return status;
 }
 
-/* ---- Fields of one frame ---- */
+/* ---- Fields ---- */
 
-static const double *values_of(const page_data *d, int field)
+static drape_status load(const page *p, int64_t frame)
 {
-    return d->shown[field] ? d->shown[field] : field == 0 ? d->x : field == 1 ? d->node_strain : d->speed;
-}
-
-static drape_status load(const page_data *d, int64_t frame)
-{
-    const drape_model *model = d->run->model;
-    const drape_record *record = &d->run->record;
+    const drape_model *model = p->model;
+    const drape_record *record = &p->record;
     const int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < record->frames ? frame + 1 : frame;
     const double h = record->times[after] - record->times[before];
-    drape_status status = drape_check_cancel(d->run->ctx);
+    drape_status status = drape_check_cancel(p->ctx);
     if (!status)
-        status = drape_record_read(record, frame, d->x);
+        status = drape_record_read(record, frame, p->x);
     if (!status)
-        status = drape_record_read(record, before, d->before);
+        status = drape_record_read(record, before, p->before);
     if (!status)
-        status = drape_record_read(record, after, d->after);
+        status = drape_record_read(record, after, p->after);
     if (status)
         return status;
-    drape_field_node_strain(model, d->x, d->strain, d->node_strain);
+    drape_field_node_strain(model, p->x, p->strain, p->node_strain);
     /* speeds by central differences of positions; one-sided at the ends of the run */
     for (int32_t i = 0; i < model->node_count; i++) {
         double difference[3];
-        vec3_sub(d->after + 3 * (size_t)i, d->before + 3 * (size_t)i, difference);
-        d->speed[i] = h > 0 ? vec3_norm(difference) / h : 0;
+        vec3_sub(p->after + 3 * (size_t)i, p->before + 3 * (size_t)i, difference);
+        p->speed[i] = h > 0 ? vec3_norm(difference) / h : 0;
     }
     if (!model->surface.bound)
         return DRAPE_OK;
-    drape_model_normals(model, d->x, d->normals);
-    drape_render_positions(model, -1, d->x, d->normals, d->shown[0]);
-    drape_render_values(model, d->node_strain, 1, d->shown[1]);
-    drape_render_values(model, d->speed, 1, d->shown[2]);
+    drape_model_normals(model, p->x, p->normals);
+    drape_render_positions(model, -1, p->x, p->normals, p->shown[0]);
+    drape_render_values(model, p->node_strain, 1, p->shown[1]);
+    drape_render_values(model, p->speed, 1, p->shown[2]);
     return DRAPE_OK;
 }
 
-/* ---- Colliders that deform ---- */
-
-static const drape_collider *collider_of(const page_data *d, int32_t body)
+/* In the loaded frame, if the field is not of a collider. */
+static const double *values_of(const page *p, int field, int64_t frame)
 {
-    return &d->run->model->colliders[d->bodies[body].collider];
+    const int32_t c = p->fields[field].collider;
+    if (c < 0)
+        return p->shown[field] ? p->shown[field] : field == 0 ? p->x : field == 1 ? p->node_strain : p->speed;
+    drape_sequence_points(&p->model->colliders[c].frames, p->record.times[frame], p->points);
+    return p->points;
 }
 
-static size_t load_body(const page_data *d, int32_t body, int64_t frame)
+static drape_status find_fields(page *p)
 {
-    const drape_collider *collider = collider_of(d, body);
-    drape_sequence_points(&collider->frames, d->run->record.times[frame], d->points);
-    return 3 * (size_t)collider->shape.point_count;
-}
-
-static drape_status find_bodies(page_data *d)
-{
-    const drape_model *model = d->run->model;
+    static const page_field at_nodes[FIELDS] = {{"positions", "m", 3, 0, -1, {0}, {0}, {0}},
+                                                {"strain", "1", 1, 0, -1, {0}, {0}, {0}},
+                                                {"speed", "m/s", 1, 0, -1, {0}, {0}, {0}}};
+    const drape_model *model = p->model;
     size_t most = 0;
-    d->bodies = drape_arena_take(&d->arena, (size_t)model->collider_count, sizeof *d->bodies);
-    for (int32_t i = 0; d->bodies && i < model->collider_count; i++) {
-        page_body *body = &d->bodies[d->body_count];
-        if (model->colliders[i].frames.frame_count == 0)
-            continue;
-        *body = (page_body){.collider = i, .field = {.name = body->block, .unit = "m", .width = 3}};
-        snprintf(body->block, sizeof body->block, "body%d", (int)i);
-        most = (size_t)fmax((double)most, model->colliders[i].shape.point_count);
-        d->body_count++;
-    }
-    d->points = drape_arena_take(&d->arena, most, 3 * sizeof *d->points);
-    return drape_arena_status(&d->arena);
-}
-
-/* ---- Which frames, and ranges ---- */
-
-static drape_status choose_frames(page_data *d, size_t max_bytes)
-{
-    int64_t all = d->run->record.frames;
-    double numbers = 5.0 * d->run->model->surface.node_count;
-    for (int32_t b = 0; b < d->body_count; b++)
-        numbers += 3.0 * collider_of(d, b)->shape.point_count;
-    const double bytes = 2 * 4.0 / 3 * numbers; /* of a frame: 16 bits a number, in base64 */
-    d->kept = (int64_t)fmin(fmax(floor((double)max_bytes / bytes), 2), (double)all);
-    d->frame = drape_arena_take(&d->arena, (size_t)d->kept, sizeof *d->frame);
-    if (!d->frame)
+    p->fields = drape_arena_take(&p->arena, FIELDS + (size_t)model->collider_count, sizeof *p->fields);
+    if (!p->fields)
         return DRAPE_E_MEMORY;
-    for (int64_t k = 0; k < d->kept; k++)
-        d->frame[k] =
-            d->kept == 1 ? 0 : (int64_t)floor((double)k * (double)(all - 1) / (double)(d->kept - 1) + 0.5);
-    return DRAPE_OK;
-}
-
-static void extend_range(page_field *field, const double *values, size_t count, double high[3])
-{
-    for (size_t i = 0; i < count; i++) {
-        size_t k = i % (size_t)field->width;
-        if (values[i] < field->low[k])
-            field->low[k] = values[i];
-        if (values[i] > high[k])
-            high[k] = values[i];
+    memcpy(p->fields, at_nodes, sizeof at_nodes);
+    for (p->field_count = 0; p->field_count < FIELDS; p->field_count++) {
+        page_field *f = &p->fields[p->field_count];
+        f->count = (size_t)model->surface.node_count * (size_t)f->width;
     }
-}
-
-static void end_range(page_field *field, const double high[3])
-{
-    for (int k = 0; k < field->width; k++)
-        field->step[k] = (high[k] - field->low[k]) / LEVELS;
-}
-
-static drape_status find_ranges(page_data *d)
-{
-    static const page_field fields[FIELDS] = {
-        {"positions", "m", 3, {0}, {0}}, {"strain", "1", 1, {0}, {0}}, {"speed", "m/s", 1, {0}, {0}}};
-    static const double lowest[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, highest[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
-    double high[FIELDS][3];
-    size_t nodes = (size_t)d->run->model->surface.node_count;
-    memcpy(d->fields, fields, sizeof fields);
-    for (int f = 0; f < FIELDS; f++) {
-        memcpy(d->fields[f].low, lowest, sizeof lowest);
-        memcpy(high[f], highest, sizeof highest);
+    for (int32_t i = 0; i < model->collider_count; i++) {
+        const drape_collider *collider = &model->colliders[i];
+        if (collider->frames.frame_count == 0)
+            continue;
+        page_field *f = &p->fields[p->field_count++];
+        *f = (page_field){
+            .unit = "m", .width = 3, .count = 3 * (size_t)collider->shape.point_count, .collider = i};
+        snprintf(f->name, sizeof f->name, "body%d", (int)i);
+        most = f->count > most ? f->count : most;
     }
-    for (int64_t k = 0; k < d->kept; k++) {
-        drape_status status = load(d, d->frame[k]);
+    p->points = drape_arena_take(&p->arena, most, sizeof *p->points);
+    return drape_arena_status(&p->arena);
+}
+
+static drape_status find_ranges(page *p)
+{
+    for (int64_t n = 0; n < p->kept; n++) {
+        drape_status status = load(p, p->frame[n]);
         if (status)
             return status;
-        for (int f = 0; f < FIELDS; f++)
-            extend_range(&d->fields[f], values_of(d, f), nodes * (size_t)d->fields[f].width, high[f]);
+        for (int i = 0; i < p->field_count; i++) {
+            page_field *f = &p->fields[i];
+            const double *values = values_of(p, i, p->frame[n]);
+            for (int k = 0; k < 3 && n == 0; k++) {
+                f->low[k] = DBL_MAX;
+                f->high[k] = -DBL_MAX;
+            }
+            for (size_t at = 0; at < f->count; at++) {
+                const size_t k = at % (size_t)f->width;
+                f->low[k] = values[at] < f->low[k] ? values[at] : f->low[k];
+                f->high[k] = values[at] > f->high[k] ? values[at] : f->high[k];
+            }
+        }
     }
-    for (int f = 0; f < FIELDS; f++)
-        end_range(&d->fields[f], high[f]);
-    for (int32_t b = 0; b < d->body_count; b++) {
-        page_field *field = &d->bodies[b].field;
-        memcpy(field->low, lowest, sizeof lowest);
-        memcpy(high[0], highest, sizeof highest);
-        for (int64_t k = 0; k < d->kept; k++)
-            extend_range(field, d->points, load_body(d, b, d->frame[k]), high[0]);
-        end_range(field, high[0]);
-    }
+    for (int i = 0; i < p->field_count; i++)
+        for (int k = 0; k < p->fields[i].width; k++)
+            p->fields[i].step[k] = (p->fields[i].high[k] - p->fields[i].low[k]) / LEVELS;
     return DRAPE_OK;
 }
 
 /* Chooses frames that take at most max_bytes in the page, evenly, the first and the last among them, and
- * finds the ranges of the fields. The arena is freed in any case. */
-static drape_status make_data(const run_source *run, size_t max_bytes, page_data *data)
+ * finds the ranges of the fields. */
+static drape_status make_data(page *p, size_t max_bytes)
 {
-    const drape_model *model = run->model;
-    const size_t nodes = (size_t)model->node_count;
-    *data = (page_data){.run = run, .arena = drape_arena_of(run->ctx)};
-    data->x = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->x);
-    data->before = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->before);
-    data->after = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->after);
-    data->strain = drape_arena_take(&data->arena, 2 * (size_t)model->triangle_count, sizeof *data->strain);
-    data->node_strain = drape_arena_take(&data->arena, nodes, sizeof *data->node_strain);
-    data->speed = drape_arena_take(&data->arena, nodes, sizeof *data->speed);
-    if (model->surface.bound) {
-        const size_t shown = (size_t)model->surface.node_count;
-        data->normals = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->normals);
-        for (int f = 0; f < FIELDS; f++)
-            data->shown[f] = drape_arena_take(&data->arena, (f == 0 ? 3 : 1) * shown, sizeof *data->shown[f]);
-    }
-    drape_status status = drape_arena_status(&data->arena);
-    if (!status)
-        status = find_bodies(data);
-    if (!status)
-        status = choose_frames(data, max_bytes);
-    return status ? status : find_ranges(data);
+    const drape_model *model = p->model;
+    const size_t nodes = (size_t)model->node_count, shown = (size_t)model->surface.node_count;
+    const int64_t all = p->record.frames;
+    p->x = drape_arena_take(&p->arena, 3 * nodes, sizeof *p->x);
+    p->before = drape_arena_take(&p->arena, 3 * nodes, sizeof *p->before);
+    p->after = drape_arena_take(&p->arena, 3 * nodes, sizeof *p->after);
+    p->strain = drape_arena_take(&p->arena, 2 * (size_t)model->triangle_count, sizeof *p->strain);
+    p->node_strain = drape_arena_take(&p->arena, nodes, sizeof *p->node_strain);
+    p->speed = drape_arena_take(&p->arena, nodes, sizeof *p->speed);
+    if (model->surface.bound)
+        p->normals = drape_arena_take(&p->arena, 3 * nodes, sizeof *p->normals);
+    for (int f = 0; f < FIELDS && model->surface.bound; f++)
+        p->shown[f] = drape_arena_take(&p->arena, (f == 0 ? 3 : 1) * shown, sizeof *p->shown[f]);
+    drape_status status = find_fields(p);
+    double numbers = 0;
+    for (int f = 0; f < p->field_count; f++)
+        numbers += (double)p->fields[f].count;
+    const double bytes = 2 * 4.0 / 3 * numbers; /* of a frame: 16 bits a number, in base64 */
+    p->kept = (int64_t)fmin(fmax(floor((double)max_bytes / bytes), 2), (double)all);
+    p->frame = status ? NULL : drape_arena_take(&p->arena, (size_t)p->kept, sizeof *p->frame);
+    if (!p->frame)
+        return DRAPE_E_MEMORY;
+    for (int64_t k = 0; k < p->kept; k++)
+        p->frame[k] =
+            p->kept == 1 ? 0 : (int64_t)floor((double)k * (double)(all - 1) / (double)(p->kept - 1) + 0.5);
+    return find_ranges(p);
 }
 
 /* ---- Base64 (RFC 4648, section 4) ---- */
@@ -303,55 +261,41 @@ static void put_byte(encoder *e, unsigned byte)
         put_group(e);
 }
 
-/* ---- Into the page ---- */
-
-static void put_values(encoder *e, const page_field *f, const double *values, size_t count)
+/* The block of a field. */
+static drape_status put_field(const page *p, int field, drape_file *file)
 {
-    for (size_t i = 0; i < count; i++) {
-        const size_t k = i % (size_t)f->width;
-        const double steps = f->step[k] > 0 ? floor((values[i] - f->low[k]) / f->step[k] + 0.5) : 0;
-        const unsigned level = !(steps > 0) ? 0 : steps > LEVELS ? LEVELS : (unsigned)steps;
-        put_byte(e, level);
-        put_byte(e, level >> 8);
-    }
-}
-
-static drape_status put_field(const page_data *data, int field, drape_file *file)
-{
-    const page_field *f = &data->fields[field];
-    encoder e = {.file = file};
-    for (int64_t k = 0; k < data->kept; k++) {
-        drape_status status = load(data, data->frame[k]);
-        if (status)
-            return status;
-        put_values(&e, f, values_of(data, field),
-                   (size_t)data->run->model->surface.node_count * (size_t)f->width);
-    }
-    if (e.count > 0)
-        put_group(&e);
-    return DRAPE_OK;
-}
-
-static drape_status put_body(const page_data *data, int32_t body, drape_file *file)
-{
+    const page_field *f = &p->fields[field];
     encoder e = {.file = file};
     drape_status status = DRAPE_OK;
-    for (int64_t k = 0; k < data->kept && !(status = drape_check_cancel(data->run->ctx)); k++)
-        put_values(&e, &data->bodies[body].field, data->points, load_body(data, body, data->frame[k]));
+    drape_file_print(file, BLOCK, f->name);
+    for (int64_t n = 0; n < p->kept && !status; n++) {
+        status = f->collider < 0 ? load(p, p->frame[n]) : drape_check_cancel(p->ctx);
+        const double *values = status ? NULL : values_of(p, field, p->frame[n]);
+        for (size_t i = 0; values && i < f->count; i++) {
+            const size_t k = i % (size_t)f->width;
+            const double steps = f->step[k] > 0 ? floor((values[i] - f->low[k]) / f->step[k] + 0.5) : 0;
+            const unsigned level = !(steps > 0) ? 0 : steps > LEVELS ? LEVELS : (unsigned)steps;
+            put_byte(&e, level);
+            put_byte(&e, level >> 8);
+        }
+    }
     if (e.count > 0)
         put_group(&e);
+    drape_file_put_text(file, BLOCK_END);
     return status;
 }
 
-static void put_triangles(const page_data *data, drape_file *file)
+static void put_triangles(const page *p, drape_file *file)
 {
-    const drape_render_surface *surface = &data->run->model->surface;
+    const drape_render_surface *surface = &p->model->surface;
     encoder e = {.file = file};
+    drape_file_print(file, BLOCK, "triangles");
     for (size_t i = 0; i < 3 * (size_t)surface->triangle_count; i++)
         for (int b = 0; b < 4; b++)
             put_byte(&e, (uint32_t)surface->triangle[i] >> 8 * b);
     if (e.count > 0)
         put_group(&e);
+    drape_file_put_text(file, BLOCK_END);
 }
 
 /* ---- Tables, as JSON (io/json.h) ---- */
@@ -383,16 +327,16 @@ static void take_row(void *user, int64_t row, char *const *cells)
 }
 
 /* {"rows": number in the file, "every": n, "columns": {name: [...]}} */
-static drape_status read_columns(const run_source *run, const char *name, columns *c, json_t **out)
+static drape_status read_columns(const page *p, const char *name, columns *c, json_t **out)
 {
     int64_t rows = 0;
-    drape_status status = drape_record_rows(&run->record, name, c->names, c->count, count_row, NULL, &rows);
+    drape_status status = drape_record_rows(&p->record, name, c->names, c->count, count_row, NULL, &rows);
     if (status)
         return status;
     c->every = rows / MAX_ROWS + 1;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] = json_array();
-    status = drape_record_rows(&run->record, name, c->names, c->count, take_row, c, &rows);
+    status = drape_record_rows(&p->record, name, c->names, c->count, take_row, c, &rows);
     json_t *object = json_object();
     for (size_t i = 0; i < c->count; i++)
         object = drape_json_with(object, c->names[i], c->arrays[i]);
@@ -419,34 +363,34 @@ static json_t *parameters(const drape_collider *collider)
 
 /* The triangles of a collider, if it has some; the page draws other types by their parameters. The points
  * of one that deforms are in a block of their own. */
-static json_t *shape(const drape_collider_shape *shape, const page_body *body)
+static json_t *shape(const drape_collider_shape *shape, const page_field *points)
 {
     json_t *corners = json_array();
     for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
         corners = drape_json_append(corners, json_integer(shape->triangle[i]));
-    if (body)
-        return json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", body->block, "count", (int)shape->point_count,
-                         "low", drape_json_numbers(body->field.low, 3), "step",
-                         drape_json_numbers(body->field.step, 3), "triangles", corners);
+    if (points)
+        return json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", points->name, "count", (int)shape->point_count,
+                         "low", drape_json_numbers(points->low, 3), "step",
+                         drape_json_numbers(points->step, 3), "triangles", corners);
     return json_pack("{s:o, s:o}", "points", drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
                      "triangles", corners);
 }
 
-static json_t *collider(const page_data *data, const drape_collider *c)
+static json_t *collider(const page *p, int32_t number)
 {
+    const drape_collider *c = &p->model->colliders[number];
+    const page_field *points = NULL;
+    for (int i = 0; i < p->field_count; i++)
+        points = p->fields[i].collider == number ? &p->fields[i] : points;
     json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(c->ops->entry.name), "name",
                                drape_json_text(c->name), "parameters", parameters(c));
-    const page_body *body = NULL;
-    for (int32_t b = 0; b < data->body_count; b++)
-        if (&data->run->model->colliders[data->bodies[b].collider] == c)
-            body = &data->bodies[b];
     if (c->shape.triangle_count > 0)
-        object = drape_json_with(object, "shape", shape(&c->shape, body));
+        object = drape_json_with(object, "shape", shape(&c->shape, points));
     if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
     json_t *displacements = json_array(), *rotations = json_array();
-    for (int64_t k = 0; k < data->kept; k++) {
-        const double t = data->run->record.times[data->frame[k]];
+    for (int64_t k = 0; k < p->kept; k++) {
+        const double t = p->record.times[p->frame[k]];
         double displacement[3], matrix[9], q[4];
         drape_track_displacement(c->track.keys, c->track.key_count, t, displacement);
         drape_turns_rotation(&c->turns, t, matrix);
@@ -461,45 +405,6 @@ static json_t *collider(const page_data *data, const drape_collider *c)
     }
     object = drape_json_with(object, "rotations", rotations);
     return drape_json_with(object, "pivot", drape_json_numbers(c->pivot, 3));
-}
-
-/* NULL: no memory. */
-static json_t *pinned(drape_context *ctx, const drape_model *model)
-{
-    drape_arena scratch = drape_arena_of(ctx);
-    uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
-    json_t *array = is_pinned ? json_array() : NULL;
-    if (is_pinned)
-        drape_render_pinned(model, is_pinned);
-    for (int32_t i = 0; is_pinned && i < model->surface.node_count; i++)
-        if (is_pinned[i])
-            array = drape_json_append(array, json_integer(i));
-    drape_arena_free(&scratch);
-    return array;
-}
-
-static json_t *fields(const page_data *data)
-{
-    json_t *array = json_array();
-    for (int f = 0; f < FIELDS; f++) {
-        const page_field *field = &data->fields[f];
-        array = drape_json_append(array,
-                                  json_pack("{s:s, s:s, s:o, s:o}", "name", field->name, "unit", field->unit,
-                                            "low", drape_json_numbers(field->low, (size_t)field->width),
-                                            "step", drape_json_numbers(field->step, (size_t)field->width)));
-    }
-    return array;
-}
-
-static json_t *frames(const page_data *data)
-{
-    json_t *times = json_array(), *kept = json_array();
-    for (int64_t k = 0; k < data->kept; k++) {
-        times = drape_json_append(times, drape_json_number(data->run->record.times[data->frame[k]]));
-        kept = drape_json_append(kept, json_integer((json_int_t)data->frame[k]));
-    }
-    return json_pack("{s:I, s:o, s:o}", "all", (json_int_t)data->run->record.frames, "times", times,
-                     "numbers", kept);
 }
 
 /* ---- All of it ---- */
@@ -518,75 +423,61 @@ static int put_escaped(const char *bytes, size_t size, void *file)
     return 0;
 }
 
-static drape_status put_json(const page_data *data, drape_file *file)
+static drape_status put_json(const page *p, drape_file *file)
 {
-    const run_source *run = data->run;
     static const char *const step_names[] = {"t",        "h",         "accepted", "iterations",
                                              "residual", "tolerance", "reason"};
     static const char *const energy_names[] = {"t_state", "kinetic",    "elastic",   "gravity",
                                                "contact", "dissipated", "numerical", "total"};
+    const drape_model *model = p->model;
+    const drape_record *record = &p->record;
     columns of_steps = {.names = step_names, .count = 7, .text_from = 6, .keep = 2},
             of_energies = {.names = energy_names, .count = 8, .text_from = 8, .keep = -1};
-    json_t *steps = NULL, *energies = NULL;
-    drape_status status = read_columns(run, "steps.csv", &of_steps, &steps);
+    json_t *steps = NULL, *energies = NULL, *pinned = json_array(), *colliders = json_array(),
+           *times = json_array(), *numbers = json_array(), *fields = json_array();
+    drape_arena scratch = drape_arena_of(p->ctx);
+    uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
+    drape_status status = is_pinned ? read_columns(p, "steps.csv", &of_steps, &steps) : DRAPE_E_MEMORY;
     if (!status)
-        status = read_columns(run, "energy.csv", &of_energies, &energies);
-    const char *slash = strrchr(run->record.folder, '/');
-    json_t *colliders = json_array();
-    for (int32_t i = 0; i < run->model->collider_count; i++)
-        colliders = drape_json_append(colliders, collider(data, &run->model->colliders[i]));
+        status = read_columns(p, "energy.csv", &of_energies, &energies);
+    if (is_pinned)
+        drape_render_pinned(model, is_pinned);
+    for (int32_t i = 0; is_pinned && i < model->surface.node_count; i++)
+        if (is_pinned[i])
+            pinned = drape_json_append(pinned, json_integer(i));
+    drape_arena_free(&scratch);
+    for (int32_t i = 0; i < model->collider_count; i++)
+        colliders = drape_json_append(colliders, collider(p, i));
+    for (int64_t k = 0; k < p->kept; k++) {
+        times = drape_json_append(times, drape_json_number(record->times[p->frame[k]]));
+        numbers = drape_json_append(numbers, json_integer((json_int_t)p->frame[k]));
+    }
+    for (const page_field *f = p->fields; f < p->fields + FIELDS; f++)
+        fields = drape_json_append(fields, json_pack("{s:s, s:s, s:o, s:o}", "name", f->name, "unit", f->unit,
+                                                     "low", drape_json_numbers(f->low, (size_t)f->width),
+                                                     "step", drape_json_numbers(f->step, (size_t)f->width)));
+    const char *slash = strrchr(record->folder, '/');
     json_t *json = json_pack(
-        "{s:s, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
-        "name", drape_json_text(slash && slash[1] ? slash + 1 : run->record.folder), "scene",
-        drape_json_text(run->scene_text), "summary", run->summary ? json_incref(run->summary) : json_null(),
-        "nodes", (int)run->model->surface.node_count, "triangles", (int)run->model->surface.triangle_count,
-        "simulated_triangles", (int)run->model->triangle_count, "length",
-        drape_json_number(run->model->length), "pinned", pinned(run->ctx, run->model), "colliders", colliders,
-        "frames", frames(data), "fields", fields(data), "steps", steps, "energies", energies);
+        "{s:s, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:{s:I, s:o, s:o}, s:o, s:o, s:o}", "version",
+        drape_version(), "name", drape_json_text(slash && slash[1] ? slash + 1 : record->folder), "scene",
+        drape_json_text(p->scene_text), "summary", p->summary ? json_incref(p->summary) : json_null(),
+        "nodes", (int)model->surface.node_count, "triangles", (int)model->surface.triangle_count,
+        "simulated_triangles", (int)model->triangle_count, "length", drape_json_number(model->length),
+        "pinned", pinned, "colliders", colliders, "frames", "all", (json_int_t)record->frames, "times", times,
+        "numbers", numbers, "fields", fields, "steps", steps, "energies", energies);
+    drape_file_print(file, BLOCK, "run");
     if (!status &&
         (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
-        status = drape_fail_memory(run->ctx, 1);
+        status = drape_fail_memory(p->ctx, 1);
+    drape_file_put_text(file, BLOCK_END);
     json_decref(json);
     return status;
 }
 
 /* ---- The page ---- */
 
-static void begin_block(drape_file *file, const char *id)
-{
-    drape_file_print(file, "<script type=\"text/plain\" id=\"%s\">", id);
-}
-
-static void end_block(drape_file *file)
-{
-    drape_file_put_text(file, "</script>\n");
-}
-
-static drape_status put_page(const page_data *data, drape_file *file)
-{
-    drape_file_put(file, drape_page_head, drape_page_head_size);
-    begin_block(file, "run");
-    drape_status status = put_json(data, file);
-    end_block(file);
-    begin_block(file, "triangles");
-    put_triangles(data, file);
-    end_block(file);
-    for (int f = 0; !status && f < FIELDS; f++) {
-        begin_block(file, data->fields[f].name);
-        status = put_field(data, f, file);
-        end_block(file);
-    }
-    for (int32_t b = 0; !status && b < data->body_count; b++) {
-        begin_block(file, data->bodies[b].block);
-        status = put_body(data, b, file);
-        end_block(file);
-    }
-    drape_file_put(file, drape_page_tail, drape_page_tail_size);
-    return status;
-}
-
 /* A page that was not named goes into the folder of the run. One that was must not be a file of the run. */
-static drape_status create_file(const run_source *run, const drape_report_def *def, drape_folder **folder,
+static drape_status create_file(drape_context *ctx, const drape_report_def *def, drape_folder **folder,
                                 drape_file *file)
 {
     static const char *const inputs[] = {"scene.json", "positions.npy", DRAPE_ENERGY_NAME, DRAPE_STEPS_NAME,
@@ -596,49 +487,25 @@ static drape_status create_file(const run_source *run, const drape_report_def *d
         for (size_t i = 0; i < sizeof inputs / sizeof *inputs && !status; i++) {
             char path[4096];
             snprintf(path, sizeof path, "%s/%s", def->run, inputs[i]);
-            status = drape_file_check_named(run->ctx, def->out, path);
+            status = drape_file_check_named(ctx, def->out, path);
         }
-        return status ? status : drape_export_begin(run->ctx, NULL, def->out, file);
+        return status ? status : drape_export_begin(ctx, NULL, def->out, file);
     }
-    status = drape_folder_open(run->ctx, def->run, false, folder);
+    status = drape_folder_open(ctx, def->run, false, folder);
     if (!status)
         status = drape_folder_check(*folder, drape_folder_is_named, NULL, DEFAULT_NAME);
     if (!status)
         status = drape_folder_begin(*folder, NULL, NULL);
-    return status ? status : drape_export_begin(run->ctx, *folder, DEFAULT_NAME, file);
+    return status ? status : drape_export_begin(ctx, *folder, DEFAULT_NAME, file);
 }
 
 /* Reads all of the run before the file is created. */
-static drape_status write_page(const run_source *run, const drape_report_def *def,
-                               drape_report_result *result, bool *input)
-{
-    drape_folder *folder = NULL;
-    page_data data;
-    drape_file file = {0};
-    drape_status status = make_data(run, def->max_bytes, &data);
-    result->frames = run->record.frames;
-    result->kept = data.kept;
-    if (!status) {
-        status = create_file(run, def, &folder, &file);
-        *input = status == DRAPE_E_ARGUMENT;
-    }
-    if (!status) {
-        status = put_page(&data, &file);
-        *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
-    }
-    if (!status)
-        status = drape_file_finish(&file);
-    result->bytes = (int64_t)file.size;
-    drape_file_destroy(&file);
-    drape_folder_close(&folder);
-    drape_arena_free(&data.arena);
-    return status;
-}
-
 drape_status drape_report_write(drape_context *ctx, const drape_report_def *def, drape_report_result *result,
                                 bool *input)
 {
-    run_source run;
+    page p = {.ctx = ctx, .arena = drape_arena_of(ctx)};
+    drape_folder *folder = NULL;
+    drape_file file = {0};
     *input = true;
     *result = (drape_report_result){.frames = 0};
     int length = def->out ? snprintf(result->path, sizeof result->path, "%s", def->out)
@@ -647,13 +514,34 @@ drape_status drape_report_write(drape_context *ctx, const drape_report_def *def,
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
                           sizeof result->path - 1);
     locale_t old = drape_locale_enter();
-    drape_status status = read_run(ctx, def->run, &run);
+    drape_status status = read_run(&p, def->run);
     if (!status)
-        status = write_page(&run, def, result, input);
-    drape_record_close(&run.record);
-    json_decref(run.summary);
-    drape_model_destroy(&run.model);
-    drape_free(ctx, run.scene_text);
+        status = make_data(&p, def->max_bytes);
+    result->frames = p.record.frames;
+    result->kept = p.kept;
+    if (!status) {
+        status = create_file(ctx, def, &folder, &file);
+        *input = status == DRAPE_E_ARGUMENT;
+    }
+    if (!status) {
+        drape_file_put(&file, drape_page_head, drape_page_head_size);
+        status = put_json(&p, &file);
+        put_triangles(&p, &file);
+        for (int f = 0; !status && f < p.field_count; f++)
+            status = put_field(&p, f, &file);
+        drape_file_put(&file, drape_page_tail, drape_page_tail_size);
+        *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
+    }
+    if (!status)
+        status = drape_file_finish(&file);
+    result->bytes = (int64_t)file.size;
+    drape_file_destroy(&file);
+    drape_folder_close(&folder);
+    drape_record_close(&p.record);
+    json_decref(p.summary);
+    drape_model_destroy(&p.model);
+    drape_free(ctx, p.scene_text);
+    drape_arena_free(&p.arena);
     drape_locale_leave(old);
     return status;
 }

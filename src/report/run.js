@@ -22,15 +22,20 @@ for (const { shape } of run.colliders) {
 run.end = run.times[run.times.length - 1];
 run.begin = run.times[0];
 
-// The kept frame at or before a time, and the share of the interval to the next one.
-function frameAt(time) {
-  const times = run.times;
+// The last of increasing times that is at or before a time; 0 if none is.
+function lastOf(times, time) {
   let low = 0, high = times.length - 1;
   while (low < high) {
     const middle = (low + high + 1) >> 1;
     if (times[middle] <= time) low = middle;
     else high = middle - 1;
   }
+  return low;
+}
+
+// The kept frame at or before a time, and the share of the interval to the next one.
+function frameAt(time) {
+  const times = run.times, low = lastOf(times, time);
   const next = Math.min(low + 1, times.length - 1);
   const span = times[next] - times[low];
   return { frame: low, next, part: span > 0 ? Math.min(Math.max((time - times[low]) / span, 0), 1) : 0 };
