@@ -47,9 +47,11 @@ int drape_pool_threads(const drape_pool *pool)
 
 /* ---- Tasks ---- */
 
-/* Takes a task and runs it; returns false if none is open. */
-static bool run_task(drape_pool *c)
+/* Runs as many tasks as it can take. They belong to one loop, which does not end before they are reported as
+ * done. */
+static void run_tasks(drape_pool *c)
 {
+    int64_t done = 0;
     uint_fast64_t open = atomic_load(&c->open);
     while (open & LEFT) {
         drape_task *run = atomic_load_explicit(&c->run, memory_order_relaxed);
@@ -58,18 +60,9 @@ static bool run_task(drape_pool *c)
         if (!atomic_compare_exchange_weak(&c->open, &open, open - 1))
             continue;
         run(user, task);
-        return true;
-    }
-    return false;
-}
-
-/* Runs as many tasks as it can take. They belong to one loop, which does not end before they are reported as
- * done. */
-static void run_tasks(drape_pool *c)
-{
-    int64_t done = 0;
-    while (run_task(c))
         done++;
+        open = atomic_load(&c->open);
+    }
     if (done > 0 && atomic_fetch_sub(&c->unfinished, done) == done && atomic_load(&c->waiting)) {
         pthread_mutex_lock(&c->lock);
         pthread_cond_signal(&c->done);

@@ -97,9 +97,6 @@ extern const drape_registry drape_verb_registry;
 
 void cli_print_help(const drape_verb *verb); /* on stdout */
 
-/* The operand as help shows it: in brackets if it is optional. */
-void cli_operand_text(const drape_verb *verb, char *text, size_t size);
-
 /* Reads a command line into a request, in which all but arena and ctx is zero. Returns CLI_GO_ON, or the exit
  * code after help or an error was printed. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);
@@ -171,9 +168,6 @@ void cli_progress_clear(cli_progress *progress);
 int cli_find_shading(const cli_command *command, const char *name, int *index);
 
 /* ---- Scenes ---- */
-
-/* A context whose scenes, models and sims stop if the program is interrupted. */
-drape_status cli_context_create(drape_context **out);
 
 /* A scene that is ready to run, in the context of its command. All members NULL: no scene. */
 typedef struct cli_scene {

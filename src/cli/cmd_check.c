@@ -60,30 +60,23 @@ static int check(const check_request *request, const cli_scene *in)
 
 /* ---- The frames of a run ---- */
 
-/* What all frames have together. */
-typedef struct tally {
-    const cli_scene *in;
-    int64_t crossed;      /* frames */
-    int64_t worst, count; /* the frame with the largest number of intersections and triangles inside */
-    double deepest;       /* [m] in any frame */
-} tally;
-
-static drape_status check_collider(tally *t, int32_t collider, int64_t frame, double time, const double *x,
-                                   int64_t *sum)
+/* Adds to the sum what passes through what, and finds the deepest point inside [m]. */
+static drape_status check_collider(const cli_scene *in, int32_t collider, int64_t frame, double time,
+                                   const double *x, int64_t *sum, double *deepest)
 {
-    const drape_collider *c = &t->in->model->colliders[collider];
+    const drape_collider *c = &in->model->colliders[collider];
     const drape_collider_pose pose = drape_collider_pose_at(c, time);
     drape_inside found;
     const drape_collider *body;
-    drape_arena arena = drape_arena_of(t->in->ctx);
-    drape_status status = drape_deformed_at(&arena, t->in->model, NULL, collider, time, &body);
+    drape_arena arena = drape_arena_of(in->ctx);
+    drape_status status = drape_deformed_at(&arena, in->model, NULL, collider, time, &body);
     if (!status)
-        status = drape_find_inside(t->in->ctx, t->in->model, body, &pose, x, &found);
+        status = drape_find_inside(in->ctx, in->model, body, &pose, x, &found);
     drape_arena_free(&arena);
     if (status || found.triangles == 0)
         return status;
     *sum += found.triangles + found.intersections;
-    t->deepest = fmax(t->deepest, found.deepest);
+    *deepest = fmax(*deepest, found.deepest);
     printf(
         "frame %lld, t=%.9g: %d triangles reach into %s, up to %.3g m deep; %lld edge-face intersections\n",
         (long long)frame, time, (int)found.triangles, CLI_SHOWN(c->name), found.deepest,
@@ -91,45 +84,39 @@ static drape_status check_collider(tally *t, int32_t collider, int64_t frame, do
     return DRAPE_OK;
 }
 
-static drape_status check_frame(tally *t, const drape_record *run, int64_t frame, double *x)
-{
-    drape_intersections found = {.count = 0};
-    drape_status status = drape_record_read(run, frame, x);
-    if (!status)
-        status = drape_find_intersections(t->in->ctx, t->in->model, x, &found);
-    int64_t sum = status ? 0 : found.count;
-    if (sum > 0) {
-        printf("frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself", (long long)frame,
-               run->times[frame], (long long)sum);
-        print_first(&found);
-    }
-    for (int32_t c = 0; !status && c < t->in->model->collider_count; c++)
-        status = check_collider(t, c, frame, run->times[frame], x, &sum);
-    t->crossed += sum > 0;
-    if (sum > t->count) {
-        t->worst = frame;
-        t->count = sum;
-    }
-    return status;
-}
-
 static int check_frames(const check_request *request, const cli_scene *in, const drape_record *run)
 {
-    tally t = {.in = in};
+    int64_t crossed = 0, worst = 0, count = 0; /* frames; the one with the largest number */
+    double deepest = 0;
     double *x = drape_arena_take(request->command.arena, (size_t)run->nodes, 3 * sizeof *x);
     drape_status status = x ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (int64_t i = 0; i < run->frames && !status && !cli_interrupted(); i++)
-        status = check_frame(&t, run, i, x);
+    for (int64_t i = 0; i < run->frames && !status && !cli_interrupted(); i++) {
+        drape_intersections found = {.count = 0};
+        status = drape_record_read(run, i, x);
+        if (!status)
+            status = drape_find_intersections(in->ctx, in->model, x, &found);
+        int64_t sum = status ? 0 : found.count;
+        if (sum > 0) {
+            printf("frame %lld, t=%.9g: %lld edge-face intersections of the cloth with itself", (long long)i,
+                   run->times[i], (long long)sum);
+            print_first(&found);
+        }
+        for (int32_t c = 0; !status && c < in->model->collider_count; c++)
+            status = check_collider(in, c, i, run->times[i], x, &sum, &deepest);
+        crossed += sum > 0;
+        worst = sum > count ? i : worst;
+        count = sum > count ? sum : count;
+    }
     if (cli_interrupted())
         return cli_report_interrupted(request->command.verb);
     if (status)
         return cli_report(&request->command, CLI_FAILED);
-    printf("%lld frames, %lld with intersections", (long long)run->frames, (long long)t.crossed);
-    if (t.crossed > 0)
-        printf("; the most in frame %lld; the deepest point is %.3g m inside a collider", (long long)t.worst,
-               t.deepest);
+    printf("%lld frames, %lld with intersections", (long long)run->frames, (long long)crossed);
+    if (crossed > 0)
+        printf("; the most in frame %lld; the deepest point is %.3g m inside a collider", (long long)worst,
+               deepest);
     putchar('\n');
-    return t.crossed > 0 ? CLI_FAILED : CLI_DONE;
+    return crossed > 0 ? CLI_FAILED : CLI_DONE;
 }
 
 static int run(const void *command)

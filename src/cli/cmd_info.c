@@ -273,22 +273,6 @@ static json_t *named(const char *name)
     return drape_json_with(json_object(), "name", drape_json_text(name));
 }
 
-static drape_status count_inside(const drape_sim *sim, int32_t index, int32_t *inside)
-{
-    const drape_collider *collider;
-    drape_arena arena = drape_arena_of(sim->ctx);
-    const drape_status status =
-        drape_deformed_at(&arena, sim->model, NULL, index, drape_sim_time(sim), &collider);
-    *inside = 0;
-    const double *x = drape_sim_positions(sim);
-    const drape_collider_pose pose =
-        drape_collider_pose_at(&sim->model->colliders[index], drape_sim_time(sim));
-    for (int32_t i = 0; !status && i < sim->model->node_count; i++)
-        *inside += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
-    drape_arena_free(&arena);
-    return status;
-}
-
 static json_t *collider(const info *in, int32_t c)
 {
     const drape_collider *from = &in->model->colliders[c];
@@ -562,23 +546,6 @@ static json_t *bytes(const info *in)
     return drape_json_with(object, "a_node", drape_json_number((double)sum / in->model->node_count));
 }
 
-/* At the start, of a step of the integrator's dt, if it has a stability limit. An infinite one becomes
- * null. */
-static json_t *with_stability(json_t *object, const info *in)
-{
-    drape_stability s;
-    if (!in->sim->chosen.integrator->stability)
-        return object;
-    in->sim->chosen.integrator->stability(in->sim->integrator, drape_sim_state(in->sim), in->profile.dt, &s);
-    json_t *limit = drape_json_with(json_object(), "omega", number(s.omega, "rad/s"));
-    limit = drape_json_with(limit, "damping", number(s.damping, "1/s"));
-    limit = drape_json_with(limit, "limit", number(s.limit, "s"));
-    limit = drape_json_with(limit, "substep", number(s.substep, "s"));
-    limit = drape_json_with(limit, "share", drape_json_number(s.substep / s.limit));
-    limit = drape_json_with(limit, "stable", json_boolean(s.substep <= s.limit));
-    return drape_json_with(object, "stability", limit);
-}
-
 /* ---- All of it ---- */
 
 static json_t *scene(const info *in)
@@ -608,7 +575,17 @@ static json_t *scene(const info *in)
     object = drape_json_with(object, "controller",
                              chosen(in, &all->controller->entry, all->controller_values, &model->controller,
                                     drape_chosen_ignores_controller));
-    object = with_stability(object, in);
+    if (all->integrator->stability) { /* at the start, of a step of its dt; an infinite limit becomes null */
+        drape_stability s;
+        all->integrator->stability(in->sim->integrator, drape_sim_state(in->sim), in->profile.dt, &s);
+        json_t *limit = drape_json_with(json_object(), "omega", number(s.omega, "rad/s"));
+        limit = drape_json_with(limit, "damping", number(s.damping, "1/s"));
+        limit = drape_json_with(limit, "limit", number(s.limit, "s"));
+        limit = drape_json_with(limit, "substep", number(s.substep, "s"));
+        limit = drape_json_with(limit, "share", drape_json_number(s.substep / s.limit));
+        limit = drape_json_with(limit, "stable", json_boolean(s.substep <= s.limit));
+        object = drape_json_with(object, "stability", limit);
+    }
     object = drape_json_with(object, "terms", list_of(in, (size_t)model->term_count, term));
     object = drape_json_with(object, "iteration", iteration(in));
     return drape_json_with(object, "bytes", bytes(in));
@@ -623,8 +600,16 @@ static drape_status make_info(const cli_command *command, const cli_scene *in, b
         drape_arena_take(command->arena, (size_t)in->model->term_count, sizeof *terms);
     all.inside = drape_arena_take(command->arena, (size_t)in->model->collider_count, sizeof *all.inside);
     drape_status status = drape_arena_status(command->arena);
-    for (int32_t c = 0; !status && c < in->model->collider_count; c++)
-        status = count_inside(in->sim, c, &all.inside[c]);
+    for (int32_t c = 0; !status && c < in->model->collider_count; c++) {
+        const double t = drape_sim_time(in->sim), *x = drape_sim_positions(in->sim);
+        const drape_collider_pose pose = drape_collider_pose_at(&in->model->colliders[c], t);
+        const drape_collider *collider;
+        drape_arena arena = drape_arena_of(in->ctx);
+        status = drape_deformed_at(&arena, in->model, NULL, c, t, &collider);
+        for (int32_t i = 0; !status && i < in->model->node_count; i++)
+            all.inside[c] += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
+        drape_arena_free(&arena);
+    }
     if (!status)
         status = drape_scene_to_def(in->scene, &all.def);
     if (!status)

@@ -41,7 +41,7 @@ typedef struct cli_object {
 
 /* How a table is printed; NULL: nothing is. */
 typedef struct list_style {
-    void (*scene)(void);
+    const char *scene; /* before its keys */
     void (*object)(const cli_object *object);
     void (*key)(const cli_object *objects, int count, int at, const drape_scene_key *key);
     void (*table)(const drape_registry *table);
@@ -105,23 +105,8 @@ static int add_objects(cli_object *objects, int count, const drape_scene_object 
     return count;
 }
 
-/* The published values of a fabric, as drape_fabric has them, and derived ones in place of those not
- * published. */
-static void describe(const drape_fabric *f, char *text, size_t size)
-{
-    drape_woven tension, bending;
-    drape_fabric_tension(f, &tension);
-    drape_fabric_bending(f, &bending);
-    int used = snprintf(text, size, "%s: %.4g kg/m2", f->what, f->areal_density);
-    used += snprintf(text + used, size - (size_t)used,
-                     isnan(f->tension.warp) ? "" : "; tension %.4g, %.4g N/m, shear %.3g N/m", tension.warp,
-                     tension.weft, tension.shear);
-    used += snprintf(text + used, size - (size_t)used, "; bending %.3g, %.3g, twist %.3g uN m",
-                     1e6 * bending.warp, 1e6 * bending.weft, 1e6 * bending.shear);
-    snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g", f->drape);
-}
-
-/* The summaries of fabrics are made from numbers, so list_tables fills in the entries. */
+/* The summaries of fabrics are made from numbers, so list_tables fills in the entries: the published values,
+ * as drape_fabric has them, and derived ones in place of those not published. */
 static const drape_entry *fabrics[MAX_FABRICS + 1];
 static const drape_registry fabric_registry = {
     "fabric", "fabrics", "Measured fabrics", "\"fabric\" of a material", fabrics, NULL};
@@ -143,7 +128,19 @@ static const drape_registry *const *list_tables(void)
     static drape_entry entries[MAX_FABRICS];
     for (int i = 0; i < MAX_FABRICS && drape_fabrics[i + 1].name; i++) { /* the first fabric is "none" */
         const drape_fabric *f = &drape_fabrics[i + 1];
-        describe(f, summaries[i], sizeof summaries[i]);
+        drape_woven tension, bending;
+        drape_fabric_tension(f, &tension);
+        drape_fabric_bending(f, &bending);
+        const size_t size = sizeof summaries[i];
+        char *text = summaries[i];
+        int used = snprintf(text, size, "%s: %.4g kg/m2", f->what, f->areal_density);
+        used += snprintf(text + used, size - (size_t)used,
+                         isnan(f->tension.warp) ? "" : "; tension %.4g, %.4g N/m, shear %.3g N/m",
+                         tension.warp, tension.weft, tension.shear);
+        used += snprintf(text + used, size - (size_t)used, "; bending %.3g, %.3g, twist %.3g uN m",
+                         1e6 * bending.warp, 1e6 * bending.weft, 1e6 * bending.shear);
+        snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g",
+                 f->drape);
         entries[i] = (drape_entry){.name = f->name, .summary = summaries[i], .reference = f->source};
         fabrics[i] = &entries[i];
     }
@@ -161,11 +158,6 @@ static bool is_shown(const drape_entry *entry, const char *only)
 static const char *reference_of(const drape_entry *entry)
 {
     return entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "";
-}
-
-static void text_scene(void)
-{
-    puts(SCENE_TITLE " (" SCENE_NAME "): its keys, object by object; N counts from 0");
 }
 
 static void text_object(const cli_object *object)
@@ -232,11 +224,6 @@ static void names_cell(const char *const *names, int count)
     for (int i = 0; i < count; i++)
         printf("%s`%s`", i ? ", " : "", names[i]);
     fputs(" |", stdout);
-}
-
-static void markdown_scene(void)
-{
-    puts("### " SCENE_TITLE "\n\n| in | key | unit | default | takes | what |\n|---|---|---|---|---|---|");
 }
 
 static void markdown_cells(const char *const *of, int count, const char *name, const char *help,
@@ -389,18 +376,20 @@ static void markdown_params(const drape_registry *table, const char *only)
         }
 }
 
-static const list_style text_style = {.scene = text_scene,
+static const list_style text_style = {.scene = SCENE_TITLE " (" SCENE_NAME
+                                                           "): its keys, object by object; N counts from 0",
                                       .object = text_object,
                                       .key = text_key,
                                       .table = text_table,
                                       .entry = text_entry,
                                       .param = text_param};
-static const list_style markdown_style = {.scene = markdown_scene,
-                                          .key = markdown_key,
-                                          .table = markdown_table,
-                                          .entries_begin = markdown_entries_begin,
-                                          .entry = markdown_entry,
-                                          .params = markdown_params};
+static const list_style markdown_style = {
+    .scene = "### " SCENE_TITLE "\n\n| in | key | unit | default | takes | what |\n|---|---|---|---|---|---|",
+    .key = markdown_key,
+    .table = markdown_table,
+    .entries_begin = markdown_entries_begin,
+    .entry = markdown_entry,
+    .params = markdown_params};
 
 /* ---- What is printed ---- */
 
@@ -431,7 +420,7 @@ static int print_scene(const list_style *style, const char *only)
         if (!only || strcmp(only, objects[i].form->name) == 0)
             objects[count++] = objects[i];
     if (count > 0)
-        style->scene();
+        puts(style->scene);
     for (int i = 0; i < count; i++) {
         if (style->object)
             style->object(&objects[i]);

@@ -4,7 +4,6 @@
 
 #include "base/clock.h"
 #include "base/hash.h"
-#include "io/checkpoint.h"
 #include "io/file.h"
 #include "io/record.h"
 #include "io/recorder.h"
@@ -160,21 +159,6 @@ static drape_status choose_realtime(void *user, const cli_scene *scene, drape_si
     return DRAPE_OK;
 }
 
-static void count(drape_summary_realtime *s, const drape_realtime *frame)
-{
-    bool full = strcmp(frame->level, "full") == 0, fewer = strcmp(frame->level, "fewer iterations") == 0;
-    s->frames++;
-    s->missed += !frame->kept;
-    s->full += full;
-    s->fewer += fewer;
-    s->larger += !full && !fewer;
-    s->inaccurate += frame->error > frame->error_bound;
-    s->crossings = frame->crossings > s->crossings ? frame->crossings : s->crossings;
-    s->still += !(frame->h > 0);
-    s->debt = frame->debt;
-    s->dropped = frame->dropped_total;
-}
-
 static int compare(const void *a, const void *b)
 {
     double x = *(const double *)a, y = *(const double *)b;
@@ -196,16 +180,28 @@ static drape_status run_realtime(realtime *r, const cli_scene *scene)
     const drape_chosen *chosen = &scene->sim->chosen;
     const double number = drape_chosen_integrator_value(chosen, "iterations", NAN);
     drape_status status = DRAPE_OK;
-    r->result.budget = frame;
+    drape_summary_realtime *s = &r->result;
+    s->budget = frame;
     if (!r->iterations.name && isnan(number)) /* not chosen */
         say(r, "iterations: not a parameter of %s", chosen->integrator->entry.name);
     else if (!r->iterations.name)
         say(r, "iterations %.0f: %s", number, r->iterations_given ? "given" : "the default of the method");
-    while (!status && end - drape_sim_time(scene->sim) - r->result.debt > 1e-9 * frame) {
+    while (!status && end - drape_sim_time(scene->sim) - s->debt > 1e-9 * frame) {
         drape_realtime report;
-        double left = end - drape_sim_time(scene->sim) - r->result.debt;
+        double left = end - drape_sim_time(scene->sim) - s->debt;
         status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
-        count(&r->result, &report);
+        const bool full = strcmp(report.level, "full") == 0,
+                   fewer = strcmp(report.level, "fewer iterations") == 0;
+        s->frames++;
+        s->missed += !report.kept;
+        s->full += full;
+        s->fewer += fewer;
+        s->larger += !full && !fewer;
+        s->inaccurate += report.error > report.error_bound;
+        s->crossings = report.crossings > s->crossings ? report.crossings : s->crossings;
+        s->still += !(report.h > 0);
+        s->debt = report.debt;
+        s->dropped = report.dropped_total;
         r->estimates = !isnan(report.error_bound);
         if (r->count == r->capacity) {
             r->capacity = r->capacity ? 2 * r->capacity : 256;
@@ -220,10 +216,10 @@ static drape_status run_realtime(realtime *r, const cli_scene *scene)
         status = drape_sim_advance(scene->sim, end);
     if (r->count > 0)
         qsort(r->seconds, r->count, sizeof *r->seconds, compare);
-    r->result.p50 = percentile(r, 0.5);
-    r->result.p95 = percentile(r, 0.95);
-    r->result.p99 = percentile(r, 0.99);
-    r->result.worst = percentile(r, 1);
+    s->p50 = percentile(r, 0.5);
+    s->p95 = percentile(r, 0.95);
+    s->p99 = percentile(r, 0.99);
+    s->worst = percentile(r, 1);
     return status;
 }
 
@@ -612,24 +608,6 @@ static int simulate(run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
-static uint64_t hash_text(uint64_t hash, const char *text)
-{
-    return text ? drape_hash_bytes(hash, text, strlen(text) + 1) : hash;
-}
-
-/* Options that change the scene are compared with that. */
-static int check_ranks(const run_request *request)
-{
-    const int32_t numbers[] = {request->resume, request->realtime, request->checkpoint_every,
-                               request->out != NULL, request->summary != NULL};
-    uint64_t options = hash_text(hash_text(DRAPE_HASH_START, request->out), request->summary);
-    options = drape_hash_bytes(options, numbers, sizeof numbers);
-    const int code = cli_ranks_compare(&request->command, options);
-    if (code != CLI_GO_ON || cli_ranks_count() == 1 || !request->realtime)
-        return code;
-    return cli_misuse(request->command.verb, "--realtime: a run on several ranks has no time budget");
-}
-
 /* Refuses options that would be ignored silently. */
 static int check_integrator(const run *r)
 {
@@ -653,7 +631,16 @@ static int load_and_run(const run_request *request)
     run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
     const char *verb = request->command.verb, *option = request->resume ? "resume" : "checkpoint-every";
     const bool keeps = keeps_checkpoints(&r);
-    int code = check_ranks(request);
+    /* The ranks compare these options here, and the scene, with those that change it, when it is read. */
+    const int32_t numbers[] = {request->resume, request->realtime, request->checkpoint_every,
+                               request->out != NULL, request->summary != NULL};
+    const char *const texts[] = {request->out, request->summary};
+    uint64_t options = drape_hash_bytes(DRAPE_HASH_START, numbers, sizeof numbers);
+    for (size_t i = 0; i < 2; i++)
+        options = texts[i] ? drape_hash_bytes(options, texts[i], strlen(texts[i]) + 1) : options;
+    int code = cli_ranks_compare(&request->command, options);
+    if (code == CLI_GO_ON && cli_ranks_count() > 1 && request->realtime)
+        code = cli_misuse(verb, "--realtime: a run on several ranks has no time budget");
     if (code == CLI_GO_ON && keeps && !request->out)
         code = cli_misuse(verb, "--%s needs --out: the checkpoint is in the folder of the run", option);
     if (code == CLI_GO_ON && keeps && request->realtime)

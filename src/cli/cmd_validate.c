@@ -22,7 +22,8 @@ typedef struct validate_request {
 typedef struct validate_style {
     const char *begin;
     void (*record)(const lab_record *record, bool first);
-    void (*end)(const int counts[4]);
+    const char *end;
+    bool counts; /* are printed after it */
 } validate_style;
 
 static void text_record(const lab_record *record, bool first)
@@ -43,12 +44,6 @@ static void text_record(const lab_record *record, bool first)
     putchar('\n');
 }
 
-static void text_end(const int counts[4])
-{
-    printf("%d passed, %d documented model errors, %d failed\n", counts[DRAPE_OUTCOME_PASS],
-           counts[DRAPE_OUTCOME_DOCUMENTED], counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED]);
-}
-
 static void markdown_record(const lab_record *record, bool first)
 {
     const drape_reference *reference = record->reference;
@@ -63,12 +58,6 @@ static void markdown_record(const lab_record *record, bool first)
            reference->entry.reference);
 }
 
-static void markdown_end(const int counts[4])
-{
-    putchar('\n');
-    text_end(counts);
-}
-
 static void json_record(const lab_record *record, bool first)
 {
     json_t *object = lab_record_json(record);
@@ -78,21 +67,15 @@ static void json_record(const lab_record *record, bool first)
     json_decref(object);
 }
 
-static void json_end(const int counts[4])
-{
-    (void)counts;
-    printf("\n]\n");
-}
-
 static const validate_style
     text_style =
         {"reference                  case       expected       obtained      error     limit  verdict\n",
-         text_record, text_end},
+         text_record, "", true},
     markdown_style =
         {"| reference | quantity | case | model | expected | obtained | error | limit | verdict | source |\n"
          "|---|---|---|---|---|---|---|---|---|---|\n",
-         markdown_record, markdown_end},
-    json_style = {"[", json_record, json_end};
+         markdown_record, "\n", true},
+    json_style = {"[", json_record, "\n]\n", false};
 
 /* ---- Running ---- */
 
@@ -153,27 +136,19 @@ typedef struct run {
     double start; /* [s] of the clock */
 } run;
 
-/* Progress counts simulations, as the search of a threshold takes several. */
-static void show_progress(run *r, size_t next)
-{
-    double done = 0, left = 0;
-    for (size_t i = 0; i < r->count; i++) {
-        const int runs = drape_validate_runs(r->records[i].reference);
-        if (!r->records[i].done)
-            left += runs;
-        else if (i < next)
-            done += runs;
-    }
-    const double wall = drape_clock_seconds() - r->start;
-    cli_progress_count(&r->progress, (int64_t)next, (int64_t)r->count, done > 0 ? wall / done * left : NAN);
-}
-
 static drape_status run_cases(run *r, const validate_style *style, int counts[4])
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < r->count; i++) {
         lab_record *record = &r->records[i];
-        show_progress(r, i);
+        double done = 0, left = 0; /* simulations, as the search of a threshold takes several */
+        for (size_t k = 0; k < r->count; k++) {
+            const int runs = drape_validate_runs(r->records[k].reference);
+            left += r->records[k].done ? 0 : runs;
+            done += r->records[k].done && k < i ? runs : 0;
+        }
+        const double wall = drape_clock_seconds() - r->start;
+        cli_progress_count(&r->progress, (int64_t)i, (int64_t)r->count, done > 0 ? wall / done * left : NAN);
         if (!record->done) {
             status = drape_validate(r->ctx, record->reference, record->index, cli_interrupted_by, NULL,
                                     &record->v);
@@ -211,7 +186,11 @@ static int run_references(drape_context *ctx, const validate_request *request, c
         fputs(style->begin, stdout);
         cli_progress_begin(&r.progress, NULL, 0);
         status = run_cases(&r, style, counts);
-        style->end(counts);
+        fputs(style->end, stdout);
+        if (style->counts)
+            printf("%d passed, %d documented model errors, %d failed\n", counts[DRAPE_OUTCOME_PASS],
+                   counts[DRAPE_OUTCOME_DOCUMENTED],
+                   counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED]);
         fflush(stdout);
     }
     const drape_status closed = drape_file_close(&r.file);
@@ -251,12 +230,10 @@ static int main_validate(const void *command)
     if (request->json && request->markdown)
         return cli_misuse("validate", "--json and --markdown exclude each other");
     if (request->command.operand) {
-        char text[DRAPE_UNKNOWN_SIZE];
-        const int i = drape_registry_find(&drape_reference_registry, NULL, request->command.operand);
-        if (i < 0) {
-            drape_registry_unknown(&drape_reference_registry, NULL, request->command.operand, text);
-            return cli_misuse("validate", "%s", text);
-        }
+        int i;
+        if (drape_registry_choose(request->command.ctx, &drape_reference_registry, "",
+                                  request->command.operand, &i))
+            return cli_misuse("validate", "%s", request->command.ctx->text);
         only = drape_references[i];
     }
     return request->scenes ? write_scenes(request, only)

@@ -97,15 +97,6 @@ static void list_movables(cli_view *v)
         }
 }
 
-static int view_open(const cli_command *command, cli_view *v)
-{
-    *v = (cli_view){.command = command, .factors = {1, 1, 1}, .dragged = -1, .paused = true};
-    int code = cli_scene_load(command, command->operand, &v->in);
-    if (code == CLI_GO_ON)
-        list_movables(v);
-    return code;
-}
-
 /* ---- Running ---- */
 
 static double view_dt(const cli_view *v)
@@ -163,15 +154,6 @@ static drape_status rebuild(cli_view *v, bool keep_state)
     v->in.model = model;
     v->in.sim = sim;
     return set_drag_spring(v, sim);
-}
-
-/* Back to the start, with all changes. */
-static void view_reset(cli_view *v)
-{
-    v->dragged = -1;
-    v->message[0] = 0;
-    if (rebuild(v, false))
-        note(v, drape_context_message(v->in.ctx));
 }
 
 /* ---- Changes ---- */
@@ -280,15 +262,6 @@ static bool view_scale(cli_view *v, view_value value, double factor)
 static const char *view_integrator(const cli_view *v)
 {
     return v->in.sim->chosen.integrator->entry.name;
-}
-
-static bool view_scale_dt(cli_view *v, double factor)
-{
-    double dt = view_dt(v);
-    bool good = commit(v, set_number(v, "/integrator/dt", factor * dt), 1, "dt");
-    if (!good)
-        set_number(v, "/integrator/dt", dt);
-    return good;
 }
 
 /* Skips integrators that only find a steady state. */
@@ -544,22 +517,14 @@ static bool project(const window_view *w, const drape_view *view, const float *p
     return q[3] > 0;
 }
 
-/* The place of a node of the simulation, which the surface that is drawn may not have. */
-static const float *node_place(const window_view *w, int32_t node, float place[3])
-{
-    for (int k = 0; k < 3; k++)
-        place[k] = (float)drape_sim_positions(w->v.in.sim)[3 * (size_t)node + (size_t)k];
-    return place;
-}
-
 /* Draws the drag spring, from its node to its target. */
 static void mark_drag_spring(window_view *w)
 {
     static const float blue[4] = {0.05f, 0.30f, 0.75f, 0.95f};
     drape_overlay *o = drape_painter_overlay(w->painter);
     const drape_view view = view_of(w);
-    float place[3];
-    const float *from = node_place(w, w->v.dragged, place);
+    const double *node = drape_sim_positions(w->v.in.sim) + 3 * (size_t)w->v.dragged;
+    const float from[3] = {(float)node[0], (float)node[1], (float)node[2]};
     const float to[3] = {(float)w->v.drag_target[0], (float)w->v.drag_target[1], (float)w->v.drag_target[2]};
     float a[3], b[3], size = 3 * o->unit;
     if (!project(w, &view, from, &a[0], &a[1], &a[2]) || !project(w, &view, to, &b[0], &b[1], &b[2]))
@@ -600,12 +565,6 @@ static drape_status draw(window_view *w)
 
 /* ---- Input ---- */
 
-static void forget_range(window_view *w)
-{
-    w->low = 0;
-    w->high = 0;
-}
-
 /* After a change; a new model needs a new stage. */
 static void redraw(window_view *w, bool new_model)
 {
@@ -624,8 +583,13 @@ static void scale_or_move(window_view *w, int key, double factor)
         double sign;
     } moves[] = {{DRAPE_KEY_LEFT, 0, -1}, {DRAPE_KEY_RIGHT, 0, 1},   {DRAPE_KEY_UP, 2, -1},
                  {DRAPE_KEY_DOWN, 2, 1},  {DRAPE_KEY_PAGE_UP, 1, 1}, {DRAPE_KEY_PAGE_DOWN, 1, -1}};
-    if (key == 'D')
-        redraw(w, view_scale_dt(&w->v, factor));
+    const double dt = view_dt(&w->v);
+    if (key == 'D') {
+        const bool good = commit(&w->v, set_number(&w->v, "/integrator/dt", factor * dt), 1, "dt");
+        if (!good)
+            set_number(&w->v, "/integrator/dt", dt);
+        redraw(w, good);
+    }
     for (view_value i = 0; i < VIEW_SCALES; i++)
         if (scales[i] == key)
             redraw(w, view_scale(&w->v, i, factor));
@@ -653,8 +617,11 @@ static void on_key(window_view *w, int key, bool back)
         view_advance(v, true);
         break;
     case 'R':
-        view_reset(v);
-        forget_range(w);
+        v->dragged = -1; /* back to the start, with all changes */
+        v->message[0] = 0;
+        if (rebuild(v, false))
+            note(v, drape_context_message(v->in.ctx));
+        w->low = w->high = 0;
         redraw(w, true);
         break;
     case 'Q':
@@ -669,7 +636,7 @@ static void on_key(window_view *w, int key, bool back)
         break;
     case 'S':
         w->shading = (w->shading + step + shadings) % shadings;
-        forget_range(w);
+        w->low = w->high = 0;
         break;
     case 'I':
         redraw(w, view_next_integrator(v, step));
@@ -691,8 +658,10 @@ static int32_t node_at(const window_view *w, double x, double y, float *depth)
     float reach = REACH * drape_painter_overlay(w->painter)->unit, best = INFINITY;
     int32_t found = -1;
     for (int32_t i = 0; i < m->node_count; i++) {
-        float place[3], px, py, pz;
-        if (m->pinned[i] || !project(w, &view, node_place(w, i, place), &px, &py, &pz))
+        const double *node = drape_sim_positions(w->v.in.sim) + 3 * (size_t)i;
+        const float place[3] = {(float)node[0], (float)node[1], (float)node[2]};
+        float px, py, pz;
+        if (m->pinned[i] || !project(w, &view, place, &px, &py, &pz))
             continue;
         float offset = hypotf(px - (float)x, py - (float)y);
         if (offset < reach && pz * (1 + offset / reach * 0.02f) < best) {
@@ -754,25 +723,22 @@ static void on_move(window_view *w, const drape_input *in)
     w->changed |= w->drag != DRAG_NONE;
 }
 
-static void take_inputs(window_view *w)
+static void take_input(window_view *w, const drape_input *in)
 {
-    drape_input in;
-    while (drape_window_next(w->window, &in)) {
-        if (in.kind == DRAPE_INPUT_KEY)
-            on_key(w, in.key, in.shift);
-        else if (in.kind == DRAPE_INPUT_PRESS)
-            on_press(w, &in);
-        else if (in.kind == DRAPE_INPUT_MOVE)
-            on_move(w, &in);
-        else if (in.kind == DRAPE_INPUT_RELEASE) {
-            if (w->drag == DRAG_NODE)
-                view_drag(&w->v, -1, NULL);
-            w->drag = DRAG_NONE;
-            w->changed = true;
-        } else {
-            w->camera.distance *= powf(NOTCH, (float)in.y);
-            w->changed = true;
-        }
+    if (in->kind == DRAPE_INPUT_KEY)
+        on_key(w, in->key, in->shift);
+    else if (in->kind == DRAPE_INPUT_PRESS)
+        on_press(w, in);
+    else if (in->kind == DRAPE_INPUT_MOVE)
+        on_move(w, in);
+    else if (in->kind == DRAPE_INPUT_RELEASE) {
+        if (w->drag == DRAG_NODE)
+            view_drag(&w->v, -1, NULL);
+        w->drag = DRAG_NONE;
+        w->changed = true;
+    } else {
+        w->camera.distance *= powf(NOTCH, (float)in->y);
+        w->changed = true;
     }
 }
 
@@ -782,11 +748,13 @@ static drape_status loop(window_view *w)
 {
     drape_status status = DRAPE_OK;
     int width, height;
+    drape_input in;
     while (!status && !w->quit && !drape_window_closed(w->window) && !cli_interrupted()) {
         double start = drape_clock_seconds();
         bool idle = w->v.paused && !w->changed;
         drape_window_poll(w->window, idle ? IDLE : 0);
-        take_inputs(w);
+        while (drape_window_next(w->window, &in))
+            take_input(w, &in);
         drape_window_size(w->window, &width, &height);
         const drape_canvas *canvas = drape_painter_canvas(w->painter);
         if ((width != canvas->width || height != canvas->height) && width >= 16 && height >= 16) {
@@ -808,10 +776,23 @@ static drape_status loop(window_view *w)
     return status;
 }
 
-static drape_status set_up(window_view *w, int width, int height)
+static int show(window_view *w)
 {
-    char title[200];
-    snprintf(title, sizeof title, "drape: %.150s", w->request->command.operand);
+    const cli_command *command = &w->request->command;
+    int width = WIDTH, height = HEIGHT;
+    char end, title[200];
+    if (w->request->size &&
+        (sscanf(w->request->size, "%5dx%5d%c", &width, &height, &end) != 2 || width < 160 || height < 120 ||
+         width > DRAPE_MAX_PICTURE || height > DRAPE_MAX_PICTURE))
+        return cli_misuse("view", "--size \"%.60s\": must be WIDTHxHEIGHT, from 160x120 to %d a side",
+                          w->request->size, DRAPE_MAX_PICTURE);
+    int code = cli_find_shading(command, w->request->shade, &w->shading);
+    if (code == CLI_GO_ON)
+        code = cli_scene_load(command, command->operand, &w->v.in);
+    if (code != CLI_GO_ON)
+        return code;
+    list_movables(&w->v);
+    snprintf(title, sizeof title, "drape: %.150s", command->operand);
     drape_status status = drape_window_create(w->ctx, title, width, height, &w->window);
     if (!status)
         status = make_painter(w);
@@ -821,30 +802,11 @@ static drape_status set_up(window_view *w, int width, int height)
         status = make_stage(w);
     if (!status)
         status = take_frame(w);
-    if (!status)
-        set_camera(w);
-    return status;
-}
-
-static int show(window_view *w)
-{
-    int width = WIDTH, height = HEIGHT;
-    char end;
-    if (w->request->size &&
-        (sscanf(w->request->size, "%5dx%5d%c", &width, &height, &end) != 2 || width < 160 || height < 120 ||
-         width > DRAPE_MAX_PICTURE || height > DRAPE_MAX_PICTURE))
-        return cli_misuse("view", "--size \"%.60s\": must be WIDTHxHEIGHT, from 160x120 to %d a side",
-                          w->request->size, DRAPE_MAX_PICTURE);
-    int code = cli_find_shading(&w->request->command, w->request->shade, &w->shading);
-    if (code == CLI_GO_ON)
-        code = view_open(&w->request->command, &w->v);
-    if (code != CLI_GO_ON)
-        return code;
-    if (set_up(w, width, height))
-        return cli_report(&w->request->command, CLI_BAD_INPUT);
-    w->v.paused = !w->request->running;
+    if (status)
+        return cli_report(command, CLI_BAD_INPUT);
+    set_camera(w);
     if (loop(w))
-        return cli_report(&w->request->command, CLI_FAILED);
+        return cli_report(command, CLI_FAILED);
     drape_statistics s = drape_sim_statistics(w->v.in.sim);
     printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
            "%.4g\n",
@@ -857,7 +819,11 @@ static int show(window_view *w)
 static int run(const void *command)
 {
     const view_request *request = command;
-    window_view w = {.request = request, .ctx = request->command.ctx};
+    window_view w = {
+        .request = request,
+        .ctx = request->command.ctx,
+        .v = {
+            .command = &request->command, .factors = {1, 1, 1}, .dragged = -1, .paused = !request->running}};
     int code = show(&w);
     drape_stage_free(&w.stage);
     drape_reel_free(&w.reel);

@@ -42,7 +42,8 @@ static int help(int argc, char **argv)
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
     char operand[64];
     for (int i = 0; drape_verbs[i]; i++) {
-        cli_operand_text(drape_verbs[i], operand, sizeof operand);
+        snprintf(operand, sizeof operand, drape_verbs[i]->operand_optional ? "[%s]" : "%s",
+                 drape_verbs[i]->operand);
         printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
     puts("\n  drape VERB --help   show the arguments of a verb\n"
@@ -62,6 +63,27 @@ static int version(int argc, char **argv)
     return CLI_DONE;
 }
 
+/* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
+static void print_warning(void *user, drape_log_level level, const char *message)
+{
+    static char last[400];
+    (void)user;
+    if (level != DRAPE_LOG_WARNING || strncmp(message, last, sizeof last - 1) == 0)
+        return;
+    snprintf(last, sizeof last, "%s", message);
+    fprintf(stderr, "warning: %s\n", message);
+}
+
+/* Scenes, models and sims of the context stop if the program is interrupted. */
+static drape_status create_context(drape_context **out)
+{
+    drape_context_def def;
+    drape_context_def_init(&def, sizeof def);
+    def.cancel = cli_interrupted_by;
+    def.log = print_warning;
+    return drape_context_create(&def, out);
+}
+
 static int run(int argc, char **argv)
 {
     static const struct {
@@ -78,7 +100,7 @@ static int run(int argc, char **argv)
     if (!verb)
         return unknown_verb(argv[1]);
     drape_context *ctx = NULL;
-    drape_status status = cli_context_create(&ctx);
+    drape_status status = create_context(&ctx);
     drape_arena arena = drape_arena_of(ctx);
     cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
     int code = CLI_FAILED;

@@ -58,16 +58,11 @@ static void print_option(const char *name, const char *argument, const char *tex
     printf("  %-24s %s\n", left, text);
 }
 
-void cli_operand_text(const drape_verb *verb, char *text, size_t size)
-{
-    snprintf(text, size, verb->operand_optional ? "[%s]" : "%s", verb->operand);
-}
-
 void cli_print_help(const drape_verb *verb)
 {
     const option_list list = list_options(verb);
     char operand[64];
-    cli_operand_text(verb, operand, sizeof operand);
+    snprintf(operand, sizeof operand, verb->operand_optional ? "[%s]" : "%s", verb->operand);
     printf("usage: drape %s %s [options]\n\n%s\n\n", verb->entry.name, operand, verb->details);
     for (size_t i = 0; i < list.count; i++)
         print_option(list.options[i]->name, list.options[i]->argument, list.options[i]->help);
@@ -150,12 +145,10 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
 
 int cli_find_shading(const cli_command *command, const char *name, int *index)
 {
-    char text[DRAPE_UNKNOWN_SIZE];
-    *index = drape_registry_find(&drape_shading_registry, NULL, name ? name : DEFAULT_SHADE);
-    if (*index >= 0)
-        return CLI_GO_ON;
-    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
-    return cli_misuse(command->verb, "--shade: %s", text);
+    return drape_registry_choose(command->ctx, &drape_shading_registry, "", name ? name : DEFAULT_SHADE,
+                                 index)
+               ? cli_misuse(command->verb, "--shade: %s", command->ctx->text)
+               : CLI_GO_ON;
 }
 
 /* ---- Values ---- */

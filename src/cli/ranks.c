@@ -26,12 +26,6 @@ static void be_silent(void)
     close(nowhere);
 }
 
-static void speak(void)
-{
-    if (messages >= 0)
-        dup2(messages, STDERR_FILENO);
-}
-
 int cli_ranks_begin(const cli_command *command)
 {
     if (!drape_mpi_is_launched())
@@ -59,7 +53,7 @@ int cli_ranks_agree(const cli_command *command, int code)
     int agreed = code;
     const int from = drape_mpi_agree(ranks, code != CLI_GO_ON, &agreed);
     if (from > 0 && from == drape_mpi_rank(ranks)) {
-        speak();
+        dup2(messages, STDERR_FILENO); /* a rank above 0 is silent */
         cli_report(command, code);
     }
     return from < 0 ? CLI_GO_ON : agreed;
@@ -85,7 +79,7 @@ drape_status cli_ranks_share(drape_status status, cli_scene *s)
     int agreed = status;
     const int from = drape_mpi_agree(ranks, status != DRAPE_OK, &agreed);
     if (from > 0 && from == drape_mpi_rank(ranks))
-        speak(); /* the caller prints its message */
+        dup2(messages, STDERR_FILENO); /* the caller prints its message */
     else if (from > 0 && drape_mpi_rank(ranks) == 0)
         be_silent();
     if (from >= 0)

@@ -10,26 +10,6 @@
 #include <string.h>
 #include <sys/stat.h>
 
-/* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
-static void print_warning(void *user, drape_log_level level, const char *message)
-{
-    static char last[400];
-    (void)user;
-    if (level != DRAPE_LOG_WARNING || strncmp(message, last, sizeof last - 1) == 0)
-        return;
-    snprintf(last, sizeof last, "%s", message);
-    fprintf(stderr, "warning: %s\n", message);
-}
-
-drape_status cli_context_create(drape_context **out)
-{
-    drape_context_def def;
-    drape_context_def_init(&def, sizeof def);
-    def.cancel = cli_interrupted_by;
-    def.log = print_warning;
-    return drape_context_create(&def, out);
-}
-
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 {
     return cli_scene_load_with(command, path, NULL, NULL, out);

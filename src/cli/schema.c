@@ -59,11 +59,6 @@ static json_t *each_required(const char *const *names)
     return cases;
 }
 
-static json_t *exactly_one(json_t *object, const char *const *names)
-{
-    return drape_json_with(object, "oneOf", each_required(names));
-}
-
 /* ---- Parameters and keys ---- */
 
 /* An integer if the value is one: 3 rather than 3.0. */
@@ -338,27 +333,26 @@ static json_t *closed(json_t *properties, json_t *required)
     return drape_json_with(object, "additionalProperties", json_false());
 }
 
-/* An object in which `key` names the entry. */
-static json_t *entry_schema(const drape_scene_object *object, const char *key, const drape_entry *entry)
-{
-    json_t *name = json_pack("{s:s, s:s}", "const", entry->name, "description", entry->summary);
-    json_t *properties = drape_json_with(properties_of(object, key), key, name);
-    json_t *required = required_of(object);
-    bool named = false;
-    for (size_t i = 0; i < json_array_size(required); i++)
-        named = named || strcmp(json_string_value(json_array_get(required, i)), key) == 0;
-    if (!named)
-        required = drape_json_append(required, json_string(key));
-    return closed(with_params(properties, entry), with_required(required, entry));
-}
-
+/* A form for each entry that the key may name. */
 static json_t *entries_schema(const drape_scene_object *object, const struct opening *opening)
 {
+    const char *key = opening->key;
     json_t *forms = json_array();
     const drape_entry *entry;
-    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
-        if (!is_implied(opening->table, i))
-            forms = drape_json_append(forms, entry_schema(object, opening->key, entry));
+    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++) {
+        if (is_implied(opening->table, i))
+            continue;
+        json_t *name = json_pack("{s:s, s:s}", "const", entry->name, "description", entry->summary);
+        json_t *properties = drape_json_with(properties_of(object, key), key, name);
+        json_t *required = required_of(object);
+        bool named = false;
+        for (size_t k = 0; k < json_array_size(required); k++)
+            named = named || strcmp(json_string_value(json_array_get(required, k)), key) == 0;
+        if (!named)
+            required = drape_json_append(required, json_string(key));
+        forms =
+            drape_json_append(forms, closed(with_params(properties, entry), with_required(required, entry)));
+    }
     for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
         const char *name = object->one_of[i]; /* an alternative to the key that opens the object */
         if (strcmp(name, object->open_with) != 0)
@@ -383,7 +377,7 @@ static json_t *with_preset(json_t *schema, const struct opening *opening)
         together = drape_json_with(together, opening->all_of[i], words(opening->all_of));
     schema = drape_json_with(schema, "then", drape_json_with(at_most_one, "dependentRequired", together));
     json_t *all = json_pack("{s:o}", "required", words(opening->all_of));
-    return drape_json_with(schema, "else", exactly_one(all, opening->one_of));
+    return drape_json_with(schema, "else", drape_json_with(all, "oneOf", each_required(opening->one_of)));
 }
 
 static json_t *object_schema(const drape_scene_object *object)
@@ -401,7 +395,7 @@ static json_t *object_schema(const drape_scene_object *object)
     const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;
     if (opening && opening->preset)
         return with_preset(schema, opening);
-    return one_of ? exactly_one(schema, one_of) : schema;
+    return one_of ? drape_json_with(schema, "oneOf", each_required(one_of)) : schema;
 }
 
 json_t *cli_schema(void)

@@ -27,16 +27,6 @@ drape_status drape_event_check_node(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-static double center(const drape_event_point *p, const double direction[3], int32_t first, int32_t end)
-{
-    double sum = 0, mass = 0;
-    for (int32_t i = first; i < end; i++) {
-        sum += p->model->mass[i] * vec3_dot(direction, p->x + 3 * (size_t)i);
-        mass += p->model->mass[i];
-    }
-    return sum / mass;
-}
-
 double drape_event_position(const drape_event_point *p, const double direction[3])
 {
     const double node = p->event->values[DRAPE_EVENT_NODE];
@@ -46,12 +36,12 @@ double drape_event_position(const drape_event_point *p, const double direction[3
                   end = cloth ? first + cloth->mesh.node_count : p->model->node_count;
     if (!isnan(node))
         return vec3_dot(direction, p->x + 3 * ((size_t)first + (size_t)node));
-    if (of == CENTER)
-        return center(p, direction, first, end);
-    double extreme = of == LOWEST ? INFINITY : -INFINITY;
+    double extreme = of == LOWEST ? INFINITY : -INFINITY, sum = 0, mass = 0;
     for (int32_t i = first; i < end; i++) {
         const double along = vec3_dot(direction, p->x + 3 * (size_t)i);
+        sum += p->model->mass[i] * along;
+        mass += p->model->mass[i];
         extreme = of == LOWEST ? fmin(extreme, along) : fmax(extreme, along);
     }
-    return extreme;
+    return of == CENTER ? sum / mass : extreme;
 }

@@ -1,5 +1,5 @@
-/* checkpoint.c: see checkpoint.h. */
-#include "io/checkpoint.h"
+/* checkpoint.c: checkpoints as files: see recorder.h. */
+#include "io/recorder.h"
 
 #include "sim/sim.h"
 

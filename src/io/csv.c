@@ -78,22 +78,6 @@ static void put_energy(drape_file *file, const drape_energy *energy)
     drape_csv_put_numbers(file, 6, parts);
 }
 
-/* "heavy@0.12126511814700001;down@0.239389200361": the events that are reported after the attempt. */
-static void put_events(drape_file *file, const drape_event_set *events)
-{
-    drape_file_put_text(file, ",");
-    if (!events || events->reported >= events->pending_count)
-        return;
-    drape_file_put_text(file, "\"");
-    for (int32_t i = events->reported; i < events->pending_count; i++) {
-        const drape_pending_root *p = &events->pending[i];
-        drape_file_put_text(file, i > events->reported ? ";" : "");
-        drape_csv_put_quoted(file, events->watches[p->event].event->name);
-        drape_file_print(file, "@%.17g", p->root.t);
-    }
-    drape_file_put_text(file, "\"");
-}
-
 drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy,
                                const drape_event_set *events)
 {
@@ -122,8 +106,16 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
         drape_file_put_text(file, ",,,,,,");
     }
     drape_csv_put_numbers(file, 2, (double[]){attempt->error, attempt->left});
-    put_events(file, events);
-    drape_file_put_text(file, "\n");
+    /* "heavy@0.12126511814700001;down@0.239389200361": the events that are reported after the attempt */
+    const int32_t first = events ? events->reported : 0, end = events ? events->pending_count : 0;
+    drape_file_put_text(file, first < end ? ",\"" : ",");
+    for (int32_t i = first; i < end; i++) {
+        const drape_pending_root *p = &events->pending[i];
+        drape_file_put_text(file, i > first ? ";" : "");
+        drape_csv_put_quoted(file, events->watches[p->event].event->name);
+        drape_file_print(file, "@%.17g", p->root.t);
+    }
+    drape_file_put_text(file, first < end ? "\"\n" : "\n");
     return drape_file_keep(file);
 }
 

@@ -106,27 +106,6 @@ static drape_status weld(drape_arena *arena, drape_arena *scratch, const drape_b
     return out->vertex ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-static drape_status make_rigid(drape_arena *arena, const drape_model *model, int32_t collider,
-                               drape_export_body *out)
-{
-    const drape_collider *c = &model->colliders[collider];
-    const drape_collider_pose pose = drape_collider_pose_at(c, 0);
-    double middle[3] = {0};
-    drape_arena scratch = drape_arena_of(arena->ctx);
-    drape_body body;
-    for (size_t i = 0; i < 3 * (size_t)model->node_count; i++)
-        middle[i % 3] += model->rest[i] / model->node_count;
-    drape_pose_own(&pose, middle, middle);
-    double normal[3];
-    const double off = c->ops->distance(c->values, &c->shape, middle, normal, NULL);
-    vec3_add_scaled(-off, normal, middle); /* what is shown of a plane is below the cloth, however far */
-    drape_status status = drape_body_create(&scratch, c, middle, REACH * model->length, &body);
-    if (!status)
-        status = weld(arena, &scratch, &body, out);
-    drape_arena_free(&scratch);
-    return status;
-}
-
 drape_status drape_export_bodies_create(drape_arena *arena, const drape_model *model,
                                         drape_export_body **bodies)
 {
@@ -138,7 +117,19 @@ drape_status drape_export_bodies_create(drape_arena *arena, const drape_model *m
         all[i].name = c->name;
         all[i].deforms = c->frames.frame_count > 0;
         if (!all[i].deforms) {
-            status = make_rigid(arena, model, i, &all[i]);
+            const drape_collider_pose pose = drape_collider_pose_at(c, 0);
+            double middle[3] = {0}, normal[3];
+            drape_arena scratch = drape_arena_of(arena->ctx);
+            drape_body body;
+            for (size_t k = 0; k < 3 * (size_t)model->node_count; k++)
+                middle[k % 3] += model->rest[k] / model->node_count;
+            drape_pose_own(&pose, middle, middle);
+            const double off = c->ops->distance(c->values, &c->shape, middle, normal, NULL);
+            vec3_add_scaled(-off, normal, middle); /* a plane is shown below the cloth, however far */
+            status = drape_body_create(&scratch, c, middle, REACH * model->length, &body);
+            if (!status)
+                status = weld(arena, &scratch, &body, &all[i]);
+            drape_arena_free(&scratch);
             continue;
         }
         all[i].first_point = points;

@@ -91,6 +91,8 @@ typedef struct glb_state {
     uint32_t frames;     /* complete frames in the file */
     char *json;          /* of the beginning of the file, with all blanks but those of the first frame */
     size_t json_size, used;
+    size_t times_room; /* of it for the accessors of the animation: times, weights, each solid that moves */
+    size_t animation_room; /* for the animation itself: channels and samplers */
     blanks at;
     primitive *primitive;
     uint32_t primitives, triangles;
@@ -390,18 +392,6 @@ static size_t add_list(glb_state *glb, size_t width)
     return add_blanks(glb, LIST_HEAD + glb->room * width + 1);
 }
 
-/* Bytes of JSON for the accessors of the animation: of times and weights, and of each solid that moves. */
-static size_t times_room(const glb_state *glb)
-{
-    return TIMES_ROOM * (1 + (size_t)glb->moving);
-}
-
-/* And for the animation itself: channels and samplers. */
-static size_t animation_room(const glb_state *glb)
-{
-    return (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM;
-}
-
 static void add_views(glb_state *glb)
 {
     static const char vertices[] =
@@ -452,7 +442,8 @@ static void add_accessors(glb_state *glb)
         add(glb, ",%s,%s", text, normals);
     }
     glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->deforming * ACCESSOR_ROOM);
-    glb->at.times = add_blanks(glb, times_room(glb));
+    glb->times_room = TIMES_ROOM * (1 + (size_t)glb->moving);
+    glb->at.times = add_blanks(glb, glb->times_room);
     add(glb, "]");
 }
 
@@ -509,7 +500,8 @@ static void make_json(glb_state *glb)
     add_views(glb);
     add_accessors(glb);
     add_meshes(glb);
-    glb->at.animation = add_blanks(glb, animation_room(glb));
+    glb->animation_room = (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM;
+    glb->at.animation = add_blanks(glb, glb->animation_room);
     add(glb, "}");
     add_blanks(glb, 3 - (glb->used + 3) % 4);
     glb->json_size = glb->used;
@@ -920,8 +912,8 @@ static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
         return DRAPE_OK;
     glb->status = DRAPE_OK;
     restore(glb, at->views, at->views + TIMES_ROOM);
-    restore(glb, at->times, at->times + times_room(glb));
-    restore(glb, at->animation, at->animation + animation_room(glb));
+    restore(glb, at->times, at->times + glb->times_room);
+    restore(glb, at->animation, at->animation + glb->animation_room);
     restore(glb, at->accessors + glb->frames * frame, at->accessors + glb->room * frame);
     for (uint32_t i = 0; i < glb->deforming; i++) {
         const object *o = &glb->object[i];

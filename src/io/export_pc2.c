@@ -42,23 +42,6 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
     return drape_file_publish(&pc2->file);
 }
 
-static drape_status write_mesh(const drape_export_def *def, const drape_frame *frame)
-{
-    const drape_render_surface *surface = &def->model->surface;
-    drape_obj obj = {.file = def->whole};
-    drape_file_name(obj.file, MESH_NAME);
-    drape_status status = drape_file_begin(obj.file);
-    if (status)
-        return status;
-    drape_file_put_text(obj.file, "# the mesh that " FILE_NAME " moves\n");
-    drape_obj_put_material_files(obj.file, surface);
-    drape_file_put_text(obj.file, "o cloth\n");
-    drape_obj_put_nodes(obj.file, frame->positions, surface->node_count);
-    for (int32_t c = 0; c < surface->cloth_count; c++)
-        drape_obj_put_faces(&obj, surface, c);
-    return drape_file_finish(obj.file);
-}
-
 static void format_count(int64_t samples, unsigned char bytes[4])
 {
     for (int b = 0; b < 4; b++)
@@ -71,9 +54,23 @@ static drape_status pc2_write(drape_context *ctx, void *state, const drape_frame
     const size_t count = 3 * (size_t)pc2->def->model->surface.node_count;
     unsigned char bytes[4];
     (void)ctx;
-    drape_status status = frame->index == 0 ? write_mesh(pc2->def, frame) : DRAPE_OK;
-    if (status)
-        return status;
+    if (frame->index == 0) { /* the mesh */
+        const drape_render_surface *surface = &pc2->def->model->surface;
+        drape_obj obj = {.file = pc2->def->whole};
+        drape_file_name(obj.file, MESH_NAME);
+        drape_status status = drape_file_begin(obj.file);
+        if (status)
+            return status;
+        drape_file_put_text(obj.file, "# the mesh that " FILE_NAME " moves\n");
+        drape_obj_put_material_files(obj.file, surface);
+        drape_file_put_text(obj.file, "o cloth\n");
+        drape_obj_put_nodes(obj.file, frame->positions, surface->node_count);
+        for (int32_t c = 0; c < surface->cloth_count; c++)
+            drape_obj_put_faces(&obj, surface, c);
+        status = drape_file_finish(obj.file);
+        if (status)
+            return status;
+    }
     for (size_t i = 0; i < count; i++)
         drape_file_put_float(&pc2->file, (float)frame->positions[i]);
     format_count(frame->index + 1, bytes);

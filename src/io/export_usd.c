@@ -34,6 +34,7 @@
 #define NAME_ROOM   64
 #define MATERIALS   "materials"
 #define PLAIN       "cloth"
+#define BINDING     "rel material:binding = </run/" MATERIALS "/%s>\n"
 
 /* An extent, and the last time code, have this many characters whatever their values. */
 #define EXTENT      "[(%15.8e, %15.8e, %15.8e), (%15.8e, %15.8e, %15.8e)]"
@@ -248,11 +249,6 @@ static void put_numbers(drape_file *file, const char *attribute, const int32_t *
     drape_file_put_text(file, "]\n");
 }
 
-static void put_binding(drape_file *file, const material *m)
-{
-    drape_file_print(file, "rel material:binding = </run/" MATERIALS "/%s>\n", m->prim);
-}
-
 /* The faces that have one of the materials of the mesh. */
 static void put_subset(usd_state *usd, drape_file *file, const drape_faces *faces, int32_t number)
 {
@@ -269,7 +265,7 @@ static void put_subset(usd_state *usd, drape_file *file, const drape_faces *face
             first = false;
         }
     drape_file_put_text(file, "]\n");
-    put_binding(file, m);
+    drape_file_print(file, BINDING, m->prim);
     drape_file_put_text(file, "}\n");
 }
 
@@ -287,7 +283,7 @@ static void put_cloth(usd_state *usd, drape_file *file, const object *o)
     const drape_mesh *mesh = mesh_of(usd, o);
     const drape_faces *faces = &mesh->faces;
     drape_file_put_text(file, "uniform bool doubleSided = 1\n");
-    put_binding(file, &usd->material[0]);
+    drape_file_print(file, BINDING, usd->material[0].prim);
     if (faces->count == 0) {
         put_triangles(file, mesh->triangle, mesh->triangle_count);
         return;
@@ -360,11 +356,6 @@ static int64_t place(const drape_file *file)
     return (int64_t)file->size + (int64_t)file->used;
 }
 
-static void format_extent(const object *o, char text[EXTENT_ROOM])
-{
-    snprintf(text, EXTENT_ROOM, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1], o->high[2]);
-}
-
 static void include(object *o, const double *x)
 {
     for (int k = 0; k < 3; k++) {
@@ -401,14 +392,13 @@ static void put_sample(usd_state *usd, object *o, const drape_frame *frame, doub
 /* Where the samples begin; before it the extent of what deforms. */
 static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
 {
-    char text[EXTENT_ROOM];
     if (deforms(usd, o)) {
         for (int32_t i = 0; i < point_count(usd, o); i++)
             include(o, point_at(usd, o, frame, i));
-        format_extent(o, text);
         drape_file_put_text(&o->file, "float3[] extent = ");
         o->extent = place(&o->file);
-        drape_file_print(&o->file, "%s\npoint3f[] points.timeSamples = {\n", text);
+        drape_file_print(&o->file, EXTENT "\npoint3f[] points.timeSamples = {\n", o->low[0], o->low[1],
+                         o->low[2], o->high[0], o->high[1], o->high[2]);
     } else {
         drape_file_put_text(&o->file, order);
         drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
@@ -491,7 +481,8 @@ static drape_status write_bounds(usd_state *usd, object *o)
     char text[EXTENT_ROOM];
     drape_status status = DRAPE_OK;
     if (o->extent > 0) {
-        format_extent(o, text);
+        snprintf(text, sizeof text, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1],
+                 o->high[2]);
         status = drape_file_overwrite(&o->file, (off_t)o->extent, text, strlen(text));
     }
     snprintf(text, sizeof text, CODE, usd->code);

@@ -35,21 +35,10 @@ typedef struct vtp_state {
 
 /* ---- The collection ---- */
 
-/* Where the last line is in the collection. */
-static off_t entries_end(const vtp_state *vtp)
-{
-    return vtp->pvd.kept - (off_t)(sizeof pvd_end - 1);
-}
-
-static bool changes(const drape_export_body *body)
-{
-    return body->moves || body->deforms;
-}
-
 /* Of a collider in a frame. */
 static void format_body_name(const vtp_state *vtp, int32_t number, int64_t frame, char name[64])
 {
-    if (changes(&vtp->def->bodies[number]))
+    if (vtp->def->bodies[number].moves || vtp->def->bodies[number].deforms)
         snprintf(name, 64, BODY_FRAME_NAME, number, frame);
     else
         snprintf(name, 64, BODY_NAME, number);
@@ -65,7 +54,7 @@ static size_t put_entry(vtp_state *vtp, size_t at, double time, int32_t part, co
 /* On a full disk the last line is restored where it was: the file already has that room. */
 static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
 {
-    const off_t end = entries_end(vtp);
+    const off_t end = vtp->pvd.kept - (off_t)(sizeof pvd_end - 1);
     char name[64];
     snprintf(name, sizeof name, DRAPE_FRAME_NAME, frame->index, "vtp");
     size_t size = put_entry(vtp, 0, frame->time, 0, name);
@@ -294,7 +283,7 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = DRAPE_OK;
     (void)ctx;
     for (int32_t b = 0; b < def->body_count && !status; b++)
-        if (changes(&def->bodies[b]) || frame->index == 0)
+        if (def->bodies[b].moves || def->bodies[b].deforms || frame->index == 0)
             status = write_body(vtp, frame, b);
     if (!status)
         status = drape_frames_begin(def, frame, "vtp");
@@ -315,7 +304,8 @@ static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
 {
     vtp_state *vtp = state;
     (void)ctx, (void)frames;
-    return drape_file_overwrite(&vtp->pvd, entries_end(vtp), pvd_end, sizeof pvd_end - 1);
+    return drape_file_overwrite(&vtp->pvd, vtp->pvd.kept - (off_t)(sizeof pvd_end - 1), pvd_end,
+                                sizeof pvd_end - 1);
 }
 
 const drape_exporter_ops drape_exporter_vtp = {

@@ -50,11 +50,6 @@ static drape_status refuse(const drape_folder *f, const char *name, const char *
 
 /* ---- Opening ---- */
 
-static int open_regular(const drape_folder *f, const char *name)
-{
-    return drape_open_regular(f->fd, name, O_RDONLY | O_NOFOLLOW);
-}
-
 bool drape_folder_is_name(const char *name)
 {
     return name && *name && !strchr(name, '/') && strcmp(name, ".") != 0 && strcmp(name, "..") != 0;
@@ -71,7 +66,7 @@ static drape_status read_manifest(drape_folder *f)
 {
     char path[512], *text;
     size_t size;
-    const int fd = open_regular(f, DRAPE_MANIFEST_NAME);
+    const int fd = drape_open_regular(f->fd, DRAPE_MANIFEST_NAME, O_RDONLY | O_NOFOLLOW);
     if (fd < 0 && errno == ENOENT)
         return DRAPE_OK;
     if (fd < 0)
@@ -104,40 +99,35 @@ static drape_status read_manifest(drape_folder *f)
 }
 
 /* A folder without flock, as some network file systems are, is used without a lock. */
-static drape_status set_up(drape_folder *f, const char *path)
-{
-    int code;
-    f->arena = drape_arena_of(f->ctx);
-    f->path = drape_arena_text(&f->arena, path);
-    if (!f->path)
-        return DRAPE_E_MEMORY;
-    for (size_t n = strlen(f->path); n > 1 && f->path[n - 1] == '/'; n--)
-        f->path[n - 1] = 0;
-    drape_status status = drape_folder_make(f->ctx, f->path);
-    if (status)
-        return status;
-    f->fd = open(f->path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (f->fd < 0)
-        return drape_file_fail(f->ctx, "open the folder", f->path, errno);
-    do
-        code = flock(f->fd, (f->shared ? LOCK_SH : LOCK_EX) | LOCK_NB);
-    while (code && errno == EINTR);
-    if (code && errno == EWOULDBLOCK)
-        return drape_fail(
-            f->ctx, DRAPE_E_ARGUMENT,
-            "another process is writing into the folder \"%.500s\"; name another, or wait for it", f->path);
-    if (code)
-        drape_log(f->ctx, DRAPE_LOG_WARNING, "the folder \"%.500s\" cannot be locked", f->path);
-    return read_manifest(f);
-}
-
 drape_status drape_folder_open(drape_context *ctx, const char *path, bool shared, drape_folder **out)
 {
+    int code;
     drape_folder *f = *out = drape_alloc(ctx, 1, sizeof *f);
     if (!f)
         return DRAPE_E_MEMORY;
-    *f = (drape_folder){.ctx = ctx, .fd = -1, .manifest = -1, .shared = shared};
-    drape_status status = set_up(f, path);
+    *f = (drape_folder){.ctx = ctx, .arena = drape_arena_of(ctx), .fd = -1, .manifest = -1, .shared = shared};
+    f->path = drape_arena_text(&f->arena, path);
+    for (size_t n = f->path ? strlen(f->path) : 0; n > 1 && f->path[n - 1] == '/'; n--)
+        f->path[n - 1] = 0;
+    drape_status status = f->path ? drape_folder_make(ctx, f->path) : DRAPE_E_MEMORY;
+    if (!status) {
+        f->fd = open(f->path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        status = f->fd < 0 ? drape_file_fail(ctx, "open the folder", f->path, errno) : DRAPE_OK;
+    }
+    if (!status) {
+        do
+            code = flock(f->fd, (shared ? LOCK_SH : LOCK_EX) | LOCK_NB);
+        while (code && errno == EINTR);
+        if (code && errno == EWOULDBLOCK)
+            status = drape_fail(
+                ctx, DRAPE_E_ARGUMENT,
+                "another process is writing into the folder \"%.500s\"; name another, or wait for it",
+                f->path);
+        else if (code)
+            drape_log(ctx, DRAPE_LOG_WARNING, "the folder \"%.500s\" cannot be locked", f->path);
+    }
+    if (!status)
+        status = read_manifest(f);
     if (status)
         drape_folder_close(out);
     return status;
@@ -235,7 +225,7 @@ static bool is_described(const json_t *lines, int fd, const struct stat *info)
 static const char *why_not_described(const drape_folder *f, const char *name, struct stat *info)
 {
     const json_t *lines = json_object_get(f->lines, name);
-    const int fd = open_regular(f, name);
+    const int fd = drape_open_regular(f->fd, name, O_RDONLY | O_NOFOLLOW);
     if (fd < 0)
         return errno == ENOENT ? NULL : errno == EINVAL ? "it is not a regular file" : "it cannot be read";
     const bool ours = lines && fstat(fd, info) == 0 && is_described(lines, fd, info);

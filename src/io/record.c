@@ -161,30 +161,12 @@ static void take_time(void *user, int64_t row, char *const *cells)
         run->times[row] = strtod(cells[0], NULL);
 }
 
-/* A killed run may have one frame more than rows, because frames are written first. */
-static drape_status read_times(drape_record *run)
-{
-    static const char *const columns[] = {"t"};
-    int64_t rows = 0;
-    run->times = drape_alloc(run->ctx, (size_t)run->frames, sizeof *run->times);
-    if (!run->times)
-        return DRAPE_E_MEMORY;
-    drape_status status = drape_record_rows(run, "energy.csv", columns, 1, take_time, run, &rows);
-    if (!status && rows < 1)
-        return drape_fail(run->ctx, DRAPE_E_PARSE,
-                          "\"%.500s\": energy.csv has no row: the run wrote no frame", run->folder);
-    run->frames = rows < run->frames ? rows : run->frames;
-    for (int64_t i = 0; i < run->frames && !status; i++)
-        if (!isfinite(run->times[i]))
-            status = drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": energy.csv has no time in row %" PRId64,
-                                run->folder, i + 1);
-    return status;
-}
-
 /* ---- Opening and closing ---- */
 
 drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run)
 {
+    static const char *const columns[] = {"t"};
+    int64_t rows = 0;
     *run = (drape_record){.ctx = ctx, .positions = -1, .nodes = nodes};
     run->folder = drape_copy_text(ctx, folder);
     if (!run->folder)
@@ -194,7 +176,22 @@ drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t n
     char *path = drape_record_path(ctx, run->folder, "positions.npy");
     drape_status status = path ? open_positions(run, path) : DRAPE_E_MEMORY;
     drape_free(ctx, path);
-    return status ? status : read_times(run);
+    if (status)
+        return status;
+    /* A killed run may have one frame more than rows, because frames are written first. */
+    run->times = drape_alloc(ctx, (size_t)run->frames, sizeof *run->times);
+    if (!run->times)
+        return DRAPE_E_MEMORY;
+    status = drape_record_rows(run, "energy.csv", columns, 1, take_time, run, &rows);
+    if (!status && rows < 1)
+        return drape_fail(ctx, DRAPE_E_PARSE, "\"%.500s\": energy.csv has no row: the run wrote no frame",
+                          run->folder);
+    run->frames = rows < run->frames ? rows : run->frames;
+    for (int64_t i = 0; i < run->frames && !status; i++)
+        if (!isfinite(run->times[i]))
+            status = drape_fail(ctx, DRAPE_E_PARSE, "\"%.500s\": energy.csv has no time in row %" PRId64,
+                                run->folder, i + 1);
+    return status;
 }
 
 void drape_record_close(drape_record *run)

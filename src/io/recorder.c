@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "io/checkpoint.h"
 #include "io/csv.h"
 #include "io/export.h"
 #include "io/scene_copy.h"
@@ -230,33 +229,29 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
         note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
 }
 
-/* Each rank writes the nodes that it owns behind what rank 0 has in the file. */
-static void write_shared(drape_recorder *r, const output *o, const double *positions)
-{
-    const drape_rows rows = rows_of(r->sim->model, positions, 3);
-    const drape_ranks *ranks = r->ranks;
-    char path[DRAPE_RANKS_PATH];
-    drape_file *file = r->progress.writes && !r->failure ? o->ops->shared(o->state) : NULL;
-    const bool reached = file && drape_file_reach(file, path, sizeof path);
-    uint64_t sum = 0;
-    int error = ranks->open(ranks, reached ? path : NULL);
-    if (!error) {
-        const int writing = ranks->write(ranks, file ? (int64_t)file->kept : 0, true, &rows, &sum),
-                  closing = ranks->close(ranks, r->def.durable);
-        error = writing ? writing : closing;
-    }
-    if (file)
-        note(r, o->ops->settle(o->state, error, sum));
-    else if (error) /* rank 0 has the message */
-        note(r, drape_fail(r->ctx, DRAPE_E_FILE, "another rank cannot write"));
-}
-
 static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
 {
     const drape_energy energy = drape_sim_energy(r->sim);
-    for (size_t i = 0; i < r->output_count; i++)
-        if (is_shared(r, &r->outputs[i]))
-            write_shared(r, &r->outputs[i], positions);
+    for (size_t i = 0; i < r->output_count; i++) {
+        const output *o = &r->outputs[i];
+        char path[DRAPE_RANKS_PATH];
+        uint64_t sum = 0;
+        if (!is_shared(r, o)) /* each rank writes the nodes that it owns behind what rank 0 has in the file */
+            continue;
+        const drape_rows rows = rows_of(r->sim->model, positions, 3);
+        drape_file *file = r->progress.writes && !r->failure ? o->ops->shared(o->state) : NULL;
+        const bool reached = file && drape_file_reach(file, path, sizeof path);
+        int error = r->ranks->open(r->ranks, reached ? path : NULL);
+        if (!error) {
+            const int writing = r->ranks->write(r->ranks, file ? (int64_t)file->kept : 0, true, &rows, &sum),
+                      closing = r->ranks->close(r->ranks, r->def.durable);
+            error = writing ? writing : closing;
+        }
+        if (file)
+            note(r, o->ops->settle(o->state, error, sum));
+        else if (error) /* rank 0 has the message */
+            note(r, drape_fail(r->ctx, DRAPE_E_FILE, "another rank cannot write"));
+    }
     gather(r, 0, 3, &positions);
     if (r->wants_fields) {
         const double *density = r->fields;
@@ -656,28 +651,6 @@ static void close_files(drape_recorder *r)
 
 /* ---- Creation ---- */
 
-static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
-{
-    drape_archive *a = def->archive;
-    drape_status status = choose_outputs(r, def);
-    if (!status)
-        status = allocate_arrays(r);
-    if (!status && r->progress.writes)
-        status = open_folder(r, def);
-    if (!status && a) {
-        archive_progress(r, a);
-        status = a->status;
-    }
-    if (!status && r->progress.writes) {
-        status = a ? resume_files(r, a) : begin_files(r);
-        r->live = !status && !r->progress.finished;
-    }
-    status = drape_ranks_agree(r->ranks, r->ctx, status);
-    r->start -= r->progress.wall;
-    /* the last stage, because an observer cannot be removed from a sim */
-    return status ? status : drape_sim_observe(r->sim, observe, r);
-}
-
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_recorder **out)
 {
@@ -690,6 +663,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
                           def->format_count);
     drape_status status = DRAPE_OK;
+    drape_archive *a = def->archive;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
     if (drape_ranks_agree_memory(drape_model_ranks(sim->model), ctx, r)) {
         drape_free(ctx, r);
@@ -705,8 +679,25 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
                           .counted = def->frames > 0};
     r->progress.writes = !r->ranks || r->ranks->rank == 0;
     scope s = scope_enter();
-    note(r, set_up(r, def));
+    status = choose_outputs(r, def);
+    if (!status)
+        status = allocate_arrays(r);
+    if (!status && r->progress.writes)
+        status = open_folder(r, def);
+    if (!status && a) {
+        archive_progress(r, a);
+        status = a->status;
+    }
+    if (!status && r->progress.writes) {
+        status = a ? resume_files(r, a) : begin_files(r);
+        r->live = !status && !r->progress.finished;
+    }
+    status = drape_ranks_agree(r->ranks, ctx, status);
+    r->start -= r->progress.wall;
+    /* the last stage, because an observer cannot be removed from a sim */
+    note(r, status ? status : drape_sim_observe(sim, observe, r));
     scope_leave(r, s);
+    status = DRAPE_OK;
     r->also_count = 0;
     if (r->failure) {
         close_files(r);

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "base/param.h"
-#include "io/file.h"
+#include "io/record.h"
 #include "model/scene_text.h"
 
 #define MESH_NAME    "scene_mesh_%d%s"
@@ -96,23 +96,6 @@ drape_status drape_scene_files(drape_context *ctx, const drape_model *model, con
 
 /* ---- Copies ---- */
 
-/* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by its
- * whole path. */
-static drape_status keep_path(copier *c, const char *source, const char *pointer)
-{
-    char folder[PATH_MAX];
-    if (*source == '/' || !getcwd(folder, sizeof folder))
-        return DRAPE_OK;
-    const size_t size = strlen(folder) + strlen(source) + 2;
-    char *whole = drape_alloc(c->ctx, size, 1);
-    if (!whole)
-        return DRAPE_E_MEMORY;
-    snprintf(whole, size, "%s/%s", folder, source);
-    const drape_status status = drape_scene_set(c->scene, pointer, whole);
-    drape_free(c->ctx, whole);
-    return status;
-}
-
 /* A file that cannot be read twice, such as a pipe, is not copied. */
 static drape_status copy_file(void *user, const char *source, const char *pointer)
 {
@@ -120,8 +103,17 @@ static drape_status copy_file(void *user, const char *source, const char *pointe
     struct stat info;
     char bytes[COPIED_ONCE];
     ssize_t count = 0;
-    if (stat(source, &info) || S_ISDIR(info.st_mode))
-        return keep_path(c, source, pointer);
+    if (stat(source, &info) || S_ISDIR(info.st_mode)) {
+        /* What is several files, as a folder of frames or their pattern, is not copied: the scene names it by
+         * its whole path. */
+        char folder[PATH_MAX];
+        if (*source == '/' || !getcwd(folder, sizeof folder))
+            return DRAPE_OK;
+        char *whole = drape_record_path(c->ctx, folder, source);
+        const drape_status kept = whole ? drape_scene_set(c->scene, pointer, whole) : DRAPE_E_MEMORY;
+        drape_free(c->ctx, whole);
+        return kept;
+    }
     if (!S_ISREG(info.st_mode))
         return DRAPE_OK;
     const int from = drape_file_open(c->ctx, source);

@@ -15,26 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-/* The estimated distance of steps to the solution of their equation [m], and the energy that is left [J]. */
-static json_t *error(const drape_statistics *s, const drape_left *left)
-{
-    return DRAPE_JSON_COUNTS(DRAPE_JSON_REALS(json_object(), {"bound", s->error_bound},
-                                              {"largest", s->error_max}, {"last", s->error_last},
-                                              {"largest_left", left->largest}, {"last_left", left->last}),
-                             {"steps_above", s->steps_above_error}, {"steps_by_local_error", left->by_error},
-                             {"steps_above_local_error", left->above_own});
-}
-
-static json_t *realtime(const drape_summary_realtime *r)
-{
-    return DRAPE_JSON_REALS(DRAPE_JSON_COUNTS(json_object(), {"frames", r->frames}, {"missed", r->missed},
-                                              {"full", r->full}, {"fewer", r->fewer}, {"larger", r->larger},
-                                              {"still", r->still}, {"inaccurate", r->inaccurate},
-                                              {"crossings", r->crossings}),
-                            {"budget", r->budget}, {"p50", r->p50}, {"p95", r->p95}, {"p99", r->p99},
-                            {"worst", r->worst}, {"debt", r->debt}, {"dropped", r->dropped});
-}
-
 /* A count of the sim; null if the host cancelled it; NULL, which fails the summary, if memory was out. */
 static json_t *found(const drape_sim *sim, int64_t count)
 {
@@ -188,8 +168,16 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                           {"residuals", s.residuals});
     object = drape_json_with(object, "newton", newton);
     object = drape_json_with(object, "tolerance", drape_json_number(s.tolerance));
-    if (!isnan(s.error_bound) || !isnan(s.error_max))
-        object = drape_json_with(object, "error", error(&s, &sim->left));
+    if (!isnan(s.error_bound) || !isnan(s.error_max)) {
+        /* the estimated distance of steps to the solution of their equation [m], and the energy left [J] */
+        json_t *error = DRAPE_JSON_REALS(json_object(), {"bound", s.error_bound}, {"largest", s.error_max},
+                                         {"last", s.error_last}, {"largest_left", sim->left.largest},
+                                         {"last_left", sim->left.last});
+        error = DRAPE_JSON_COUNTS(error, {"steps_above", s.steps_above_error},
+                                  {"steps_by_local_error", sim->left.by_error},
+                                  {"steps_above_local_error", sim->left.above_own});
+        object = drape_json_with(object, "error", error);
+    }
     json_t *wall = DRAPE_JSON_REALS(
         json_object(), {"total", def->wall_total}, {"setup", s.wall_setup}, {"steps", s.wall_steps},
         {"residual", s.wall_residual}, {"jacobian", s.wall_jacobian}, {"factor", s.wall_factor},
@@ -213,8 +201,17 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = with_events(object, sim);
     object = with_seams(object, sim);
     object = drape_json_with(object, "warnings", warnings(sim));
-    if (def->realtime)
-        object = drape_json_with(object, "realtime", realtime(def->realtime));
+    if (def->realtime) {
+        const drape_summary_realtime *r = def->realtime;
+        json_t *realtime =
+            DRAPE_JSON_COUNTS(json_object(), {"frames", r->frames}, {"missed", r->missed}, {"full", r->full},
+                              {"fewer", r->fewer}, {"larger", r->larger}, {"still", r->still},
+                              {"inaccurate", r->inaccurate}, {"crossings", r->crossings});
+        realtime = DRAPE_JSON_REALS(realtime, {"budget", r->budget}, {"p50", r->p50}, {"p95", r->p95},
+                                    {"p99", r->p99}, {"worst", r->worst}, {"debt", r->debt},
+                                    {"dropped", r->dropped});
+        object = drape_json_with(object, "realtime", realtime);
+    }
     snprintf(digits, sizeof digits, "%016" PRIx64, drape_sim_hash(sim));
     return drape_json_with(object, "hash", json_string(digits));
 }

@@ -177,7 +177,7 @@ const keys = {
   1: () => shadeBy('plain'), 2: () => shadeBy('strain'), 3: () => shadeBy('speed'),
 };
 
-function bindKeys() {
+function bindKeysAndPlots() {
   document.addEventListener('keydown', (event) => {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, own = event.target;
     const typing = own.matches && (own.matches('select, summary') || (key === ' ' && own.matches('button, input[type=checkbox]')));
@@ -185,9 +185,6 @@ function bindKeys() {
     event.preventDefault();
     keys[key]();
   });
-}
-
-function bindPlots() {
   for (const plot of plots) {
     if (!plot.image) continue;
     const follow = (event) => { if (event.buttons & 1) seek(plot.timeAt(event)); };
@@ -241,8 +238,7 @@ function start() {
   }
   element('legend').querySelector('i').style.background = colorGradient();
   bindControls();
-  bindKeys();
-  bindPlots();
+  bindKeysAndPlots();
   takeAddress();
   requestAnimationFrame(tick);
 }

@@ -347,45 +347,37 @@ static drape_status read_columns(const page *p, const char *name, columns *c, js
 
 /* ---- Scene ---- */
 
-static json_t *parameters(const drape_collider *collider)
-{
-    json_t *object = json_object();
-    for (int i = 0; i < collider->ops->entry.param_count; i++) {
-        const drape_param *param = &collider->ops->entry.params[i];
-        const double *value = collider->values + drape_param_place(collider->ops->entry.params, i);
-        object = drape_json_with(object, param->name,
-                                 drape_param_width(param) > 1
-                                     ? drape_json_numbers(value, (size_t)drape_param_width(param))
-                                     : drape_json_number(*value));
-    }
-    return object;
-}
-
-/* The triangles of a collider, if it has some; the page draws other types by their parameters. The points
- * of one that deforms are in a block of their own. */
-static json_t *shape(const drape_collider_shape *shape, const page_field *points)
-{
-    json_t *corners = json_array();
-    for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
-        corners = drape_json_append(corners, json_integer(shape->triangle[i]));
-    if (points)
-        return json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", points->name, "count", (int)shape->point_count,
-                         "low", drape_json_numbers(points->low, 3), "step",
-                         drape_json_numbers(points->step, 3), "triangles", corners);
-    return json_pack("{s:o, s:o}", "points", drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
-                     "triangles", corners);
-}
-
 static json_t *collider(const page *p, int32_t number)
 {
     const drape_collider *c = &p->model->colliders[number];
     const page_field *points = NULL;
     for (int i = 0; i < p->field_count; i++)
         points = p->fields[i].collider == number ? &p->fields[i] : points;
-    json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(c->ops->entry.name), "name",
-                               drape_json_text(c->name), "parameters", parameters(c));
-    if (c->shape.triangle_count > 0)
-        object = drape_json_with(object, "shape", shape(&c->shape, points));
+    const drape_entry *entry = &c->ops->entry;
+    const drape_collider_shape *shape = &c->shape;
+    json_t *parameters = json_object(), *corners = json_array();
+    for (int i = 0; i < entry->param_count; i++) {
+        const double *value = c->values + drape_param_place(entry->params, i);
+        const int width = drape_param_width(&entry->params[i]);
+        parameters =
+            drape_json_with(parameters, entry->params[i].name,
+                            width > 1 ? drape_json_numbers(value, (size_t)width) : drape_json_number(*value));
+    }
+    for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
+        corners = drape_json_append(corners, json_integer(shape->triangle[i]));
+    json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(entry->name), "name",
+                               drape_json_text(c->name), "parameters", parameters);
+    /* The triangles, if it has some; the page draws other types by their parameters. The points of one that
+     * deforms are in a block of their own. */
+    json_t *triangles = points ? json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", points->name, "count",
+                                           (int)shape->point_count, "low", drape_json_numbers(points->low, 3),
+                                           "step", drape_json_numbers(points->step, 3), "triangles", corners)
+                               : json_pack("{s:o, s:o}", "points",
+                                           drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
+                                           "triangles", corners);
+    if (shape->triangle_count > 0)
+        object = drape_json_with(object, "shape", json_incref(triangles));
+    json_decref(triangles);
     if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
     json_t *displacements = json_array(), *rotations = json_array();
