@@ -150,9 +150,10 @@ drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drap
     drape_status status = drape_file_create_in(ctx, folder, &c.out);
     if (!status)
         status = drape_scene_files(ctx, model, path, copy_file, &c);
-    drape_file_name(&c.out, DRAPE_SCENE_COPY);
-    if (!status)
+    if (!status) {
+        drape_file_name(&c.out, DRAPE_SCENE_COPY);
         status = drape_file_begin(&c.out);
+    }
     if (!status) {
         drape_scene_print(scene, put, &c.out);
         status = drape_file_finish(&c.out);
