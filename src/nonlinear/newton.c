@@ -63,6 +63,7 @@
 #define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
 #define MAX_AHEAD      0.1  /* of an edge: pins further ahead of the guess pull it along */
 #define MAX_CHORDS     2    /* simplified corrections after one correction, without contact */
+#define MAX_PREDICTION 2    /* corrections in a solve, after which stress is no longer predicted */
 #define STALLED        0.5  /* of the residual before: if no more is gained, it may be rounding */
 /* Corrections that contract by less are taken to contract by so much: nine more like the last one follow. */
 #define MAX_CONTRACTION 0.9
@@ -70,8 +71,7 @@
 /* Corrections where cloth touches something, however little time there is: what fewer leave throws it about,
  * so that later steps need more (docs/realtime.md, "What is saved first"). */
 #define MIN_IN_CONTACT 3
-/* Corrections after which a sheet is taken to buckle: stress is no longer predicted, and larger steps of the same
- * motion might fail. */
+/* Corrections in a solve after which a larger step of the same motion might fail. */
 #define MANY 10
 
 struct drape_newton {
@@ -375,13 +375,13 @@ static drape_status ensure_descent(drape_newton *s, drape_status status, const d
     return status ? status : solve(s, minus_f, s->tolerance, p);
 }
 
-/* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
- * last correction are meaningless, the iteration may cycle, and stress is no longer predicted. */
+/* Along the first corrections, which are long. If they have not led near a solution, the sheet may be buckling: then
+ * forces extrapolated along a correction are meaningless, and the iteration may cycle. */
 static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
     double start = drape_system_clock(e->system);
-    if (s->corrections <= MANY)
+    if (s->corrections <= MAX_PREDICTION)
         drape_stress_predictor_correct(&s->predictor, &e->point, p);
     else
         drape_stress_predictor_forget(&s->predictor);
