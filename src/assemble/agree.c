@@ -14,14 +14,6 @@ typedef struct finding {
     drape_agreed texts;
 } finding;
 
-static int32_t number_of(const char *reason)
-{
-    int32_t i = 0;
-    while (i < DRAPE_REASON_OTHER && strcmp(drape_reason_name((drape_reason)i), reason) != 0)
-        i++;
-    return i;
-}
-
 static finding finding_of(const drape_model *model, const drape_diagnostic *d)
 {
     finding f = {.element = d->element, .cloth = d->cloth, .value = d->value, .limit = d->limit};
@@ -63,7 +55,10 @@ drape_status drape_agree(drape_agreed *agreed, const drape_model *model, drape_s
     if (from == ranks->rank) {
         f = finding_of(model, diagnostic);
         f.status = status;
-        f.reason = number_of(*reason);
+        int32_t i = 0;
+        while (i < DRAPE_REASON_OTHER && strcmp(drape_reason_name((drape_reason)i), *reason) != 0)
+            i++;
+        f.reason = i;
     }
     tell(ranks, from, agreed, &f, diagnostic);
     *reason = drape_reason_name((drape_reason)f.reason);

@@ -26,26 +26,33 @@ static void rates_of_history(const drape_term *term, const drape_request *want, 
         b->rate[i] = want->point->weight * b->q[i] + history[i];
 }
 
-/* Adds what the sliders of the term do. */
-static void add_sliders(const drape_term *term, const drape_request *want, drape_block *b)
+/* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
+static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
 {
+    const drape_elements *el = &term->elements;
+    const double *k = el->rest + b->first, *q0 = el->rest + (size_t)el->count + b->first;
+    const double elastic = want->conservative;
+    for (int32_t i = 0; i < b->count; i++) {
+        b->strain[i] = b->q[i] - q0[i];
+        b->by_strain[i] = elastic * k[i];
+        b->force[i] = b->by_strain[i] * b->strain[i];
+        b->energy[i] = 0.5 * b->force[i] * b->strain[i];
+        b->by_rate[i] = 0;
+    }
+    /* Adds what the sliders of the term do. */
     for (int s = 0; want->conservative && s < term->sliders; s++) {
         const size_t first = (size_t)s * (size_t)term->elements.count + (size_t)b->first;
-        const double *k = term->slider_stiffness + first, *limit = term->slider_limit + first,
+        const double *stiffness = term->slider_stiffness + first, *limit = term->slider_limit + first,
                      *slid = want->point->internal + term->first_slider + first;
         for (int32_t i = 0; i < b->count; i++) {
-            const drape_slider_value v = drape_slider_at(k[i], limit[i], b->strain[i] - slid[i]);
+            const drape_slider_value v = drape_slider_at(stiffness[i], limit[i], b->strain[i] - slid[i]);
             b->force[i] += v.force;
             b->by_strain[i] += v.slope;
             b->energy[i] += v.energy;
         }
     }
-}
-
-/* Adds what the Maxwell branches of the term do, at the time of the point after that of the last accepted
- * state. */
-static void add_branches(const drape_term *term, const drape_request *want, const double *k, drape_block *b)
-{
+    /* Adds what the Maxwell branches of the term do, at the time of the point after that of the last
+     * accepted state. */
     const drape_point *point = want->point;
     for (int n = 0; want->conservative && n < term->branch_count; n++) {
         const drape_branch *branch = &term->branches[n];
@@ -61,23 +68,6 @@ static void add_branches(const drape_term *term, const drape_request *want, cons
                                          0.5 * decay.constant * e0 * e0);
         }
     }
-}
-
-/* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
-static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
-{
-    const drape_elements *el = &term->elements;
-    const double *k = el->rest + b->first, *q0 = el->rest + (size_t)el->count + b->first;
-    const double elastic = want->conservative;
-    for (int32_t i = 0; i < b->count; i++) {
-        b->strain[i] = b->q[i] - q0[i];
-        b->by_strain[i] = elastic * k[i];
-        b->force[i] = b->by_strain[i] * b->strain[i];
-        b->energy[i] = 0.5 * b->force[i] * b->strain[i];
-        b->by_rate[i] = 0;
-    }
-    add_sliders(term, want, b);
-    add_branches(term, want, k, b);
     const double *c = want->dissipative && term->damping ? term->damping + b->first : NULL;
     for (int32_t i = 0; c && i < b->count; i++) {
         b->force[i] += c[i] * b->rate[i];
@@ -164,14 +154,6 @@ static void pairs_along(const drape_term *term, const double *v, const drape_blo
                                       p->d[2][i] * p->approach[2][i]);
 }
 
-static void stress_of_pairs(const drape_term *term, const drape_request *want, drape_block *b, pairs *p)
-{
-    double ahead[N] = {0};
-    if (want->along)
-        pairs_along(term, want->along, b, p, ahead);
-    write_stress(term, want, b, ahead);
-}
-
 /* f P + w dq dq' = f c I + (w c^2 - f c/d.d) d d' */
 LANES_DISPATCH static void pair_blocks(drape_block *b, const pairs *p)
 {
@@ -216,8 +198,12 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
     else if (drape_block_has_rates(term))
         pairs_along(term, want->point->v, b, &p, b->rate);
     sum_stresses(term, want, b);
-    if (want->stress)
-        stress_of_pairs(term, want, b, &p);
+    if (want->stress) {
+        double ahead[N] = {0};
+        if (want->along)
+            pairs_along(term, want->along, b, &p, ahead);
+        write_stress(term, want, b, ahead);
+    }
     for (int r = 0; r < 3; r++)
         for (int32_t i = 0; i < b->count; i++)
             b->gradient[r * N + i] = p.d[r][i] * (b->force[i] * b->per_length[i]);
@@ -287,14 +273,6 @@ static void measures_along(const drape_term *term, const double *nodes, const dr
     }
 }
 
-static void stress_of_measures(const drape_term *term, const drape_request *want, const drape_block *b)
-{
-    double ahead[N] = {0};
-    if (want->along)
-        measures_along(term, want->along, b, ahead);
-    write_stress(term, want, b, ahead);
-}
-
 /* The blocks on and below the diagonal. */
 LANES_DISPATCH static void measure_hessians(int d, drape_block *b)
 {
@@ -344,27 +322,24 @@ static void nonsymmetric_hessian(const drape_term *term, const drape_request *wa
                                      dq[LANES * r] * (b->of_dq[i] * dq[LANES * c] + along[c]);
 }
 
-/* Moves ddq in b->hessian by positive_share towards the part of it that is positive semidefinite under the
- * measure's force. */
-static void split_hessians(const drape_term *term, const drape_request *want, drape_block *b)
-{
-    const drape_elements *el = &term->elements;
-    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
-    const int size = 9 * el->nodes * el->nodes;
-    term->ops->positive(el, b->first, b->count, want->point->x, internal, b->of_ddq, b->scratch);
-    for (int32_t i = 0; i < b->count; i++) {
-        double *h = b->hessian + drape_block_start(b, i, size);
-        for (int k = 0; k < size; k++)
-            h[LANES * k] += want->positive_share * (b->scratch[i * size + k] - h[LANES * k]);
-    }
-}
-
 static void hessians_of_measures(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
     weigh(term, want, b);
-    if (term->ops->positive && want->positive_share > 0 && !want->velocity)
-        split_hessians(term, want, b);
+    if (term->ops->positive && want->positive_share > 0 && !want->velocity) {
+        /* Moves ddq in b->hessian by positive_share towards the part of it that is positive semidefinite
+         * under the measure's force. */
+        const drape_elements *el = &term->elements;
+        const double *internal =
+            term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+        const int size = 9 * el->nodes * el->nodes;
+        term->ops->positive(el, b->first, b->count, want->point->x, internal, b->of_ddq, b->scratch);
+        for (int32_t i = 0; i < b->count; i++) {
+            double *h = b->hessian + drape_block_start(b, i, size);
+            for (int k = 0; k < size; k++)
+                h[LANES * k] += want->positive_share * (b->scratch[i * size + k] - h[LANES * k]);
+        }
+    }
     b->mirrored = !drape_block_is_nonsymmetric(term, want);
     if (want->velocity)
         velocity_hessians(d, b);
@@ -385,8 +360,12 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
     else if (drape_block_has_rates(term))
         measures_along(term, want->point->v, b, b->rate);
     sum_stresses(term, want, b);
-    if (want->stress)
-        stress_of_measures(term, want, b);
+    if (want->stress) {
+        double ahead[N] = {0};
+        if (want->along)
+            measures_along(term, want->along, b, ahead);
+        write_stress(term, want, b, ahead);
+    }
     for (int32_t g = 0; g < b->count; g += LANES)
         for (int k = 0; k < d; k++)
             for (int l = 0; l < LANES; l++)
@@ -427,16 +406,6 @@ static void scale_load(const drape_elements *el, const drape_request *want, drap
         scale(el->factor, b->hessian, count * d * d);
 }
 
-static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
-{
-    const drape_elements el = elements_at(term, want->point);
-    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
-    term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
-                      want->hessian ? b->hessian : NULL);
-    if (term->history && term->ops->external)
-        scale_load(&el, want, b);
-}
-
 /* h -= dg/dv W: the wind at an element's nodes changes as they move. */
 static void carry_wind(const drape_term *term, const double *gradient, const double *dg_dv, int32_t element,
                        double *h)
@@ -450,15 +419,6 @@ static void carry_wind(const drape_term *term, const double *gradient, const dou
             for (int c = 0; c < 3; c++)
                 h[d * row + 3 * a + c] -= by[0] * w[c] + by[1] * w[3 + c] + by[2] * w[6 + c];
         }
-}
-
-/* The energies of motion and their momenta. */
-static void evaluate_momenta(const drape_term *term, const drape_request *want, drape_block *b)
-{
-    const drape_elements el = elements_at(term, want->point);
-    const double *v = want->against && term->ops->in_medium ? want->against : want->point->v;
-    term->ops->kinetic(&el, b->first, b->count, want->point->x, v,
-                       &(drape_kinetic){.t = b->energy, .by_v = b->gradient});
 }
 
 /* Adds r dT/dv - dT/dx of one element to its force, and the derivatives by x and v to dg_dx and dg_dv (d x
@@ -523,21 +483,6 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }
 
-/* Of a matrix that is not symmetric, the symmetric part is made positive semidefinite. */
-static void project(int d, double share, double *h, double *positive)
-{
-    for (int i = 0; i < d; i++)
-        for (int j = 0; j < d; j++)
-            positive[d * i + j] = (h[d * i + j] + h[d * j + i]) / 2;
-    drape_project(d, positive);
-    for (int i = 0; i < d; i++)
-        for (int j = 0; j <= i; j++) {
-            const double change = share * (positive[d * i + j] - (h[d * i + j] + h[d * j + i]) / 2);
-            h[d * i + j] += change;
-            h[d * j + i] += i == j ? 0 : change;
-        }
-}
-
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b)
 {
     b->pairs = term->ops->pair;
@@ -547,17 +492,41 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
         evaluate_pairs(term, want, b);
     else if (term->ops->measure)
         evaluate_measures(term, want, b);
-    else if (term->ops->energy)
-        evaluate_energies(term, want, b);
-    else if (want->momentum)
-        evaluate_momenta(term, want, b);
-    else
+    else if (term->ops->energy) {
+        const drape_elements el = elements_at(term, want->point);
+        const double *internal =
+            term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+        term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
+                          want->hessian ? b->hessian : NULL);
+        if (term->history && term->ops->external)
+            scale_load(&el, want, b);
+    } else if (want->momentum) {
+        /* The energies of motion and their momenta. */
+        const drape_elements el = elements_at(term, want->point);
+        const double *v = want->against && term->ops->in_medium ? want->against : want->point->v;
+        term->ops->kinetic(&el, b->first, b->count, want->point->x, v,
+                           &(drape_kinetic){.t = b->energy, .by_v = b->gradient});
+    } else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
     /* Of measures the positive part is taken already, and convex energies are their own. Drag has none: it is
      * not symmetric, and much of what neighbouring triangles add cancels. Positive parts would not, and would
      * hold light cloth fast. */
     const bool given = term->ops->measure || term->ops->in_medium || term->ops->convex;
-    for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
-        project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
+    for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++) {
+        /* Of a matrix that is not symmetric, the symmetric part is made positive semidefinite. */
+        double *h = b->hessian + (size_t)i * (size_t)(d * d);
+        double *positive = b->scratch;
+        for (int k = 0; k < d; k++)
+            for (int j = 0; j < d; j++)
+                positive[d * k + j] = (h[d * k + j] + h[d * j + k]) / 2;
+        drape_project(d, positive);
+        for (int k = 0; k < d; k++)
+            for (int j = 0; j <= k; j++) {
+                const double change =
+                    want->positive_share * (positive[d * k + j] - (h[d * k + j] + h[d * j + k]) / 2);
+                h[d * k + j] += change;
+                h[d * j + k] += k == j ? 0 : change;
+            }
+    }
 }

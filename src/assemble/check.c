@@ -94,31 +94,6 @@ static double ratio(double difference, double scale)
 
 /* ---- The state ---- */
 
-/* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
-static void rotate(const double a[3], double out[3])
-{
-    const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)};
-    double sine, cosine;
-    drape_sin_cos(0.7, &sine, &cosine);
-    double along = k[0] * a[0] + k[1] * a[1] + k[2] * a[2];
-    const double cross[3] = {k[1] * a[2] - k[2] * a[1], k[2] * a[0] - k[0] * a[2], k[0] * a[1] - k[1] * a[0]};
-    for (int i = 0; i < 3; i++)
-        out[i] = cosine * a[i] + sine * cross[i] + (1 - cosine) * along * k[i];
-}
-
-/* Maxwell branches are extended as strains are, and were so a part of their time ago. */
-static void extend_branches(checker *c)
-{
-    for (int32_t t = 0; t < c->model->term_count; t++) {
-        const drape_term *term = &c->model->terms[t];
-        double *kept = c->internal + term->first_branch;
-        for (int64_t i = 1 + term->elements.count; i < drape_term_branch_numbers(term); i++)
-            kept[i] = DEFORMATION * uniform(c);
-        if (term->branch_count > 0)
-            kept[0] = -0.7 * term->branches[0].time;
-    }
-}
-
 static void make_state(checker *c, const drape_state *rest)
 {
     const drape_model *m = c->model;
@@ -128,10 +103,28 @@ static void make_state(checker *c, const drape_state *rest)
             deformed[k] = rest->x[3 * i + (size_t)k] + DEFORMATION * c->size * uniform(c);
             c->v[3 * i + (size_t)k] = c->size * uniform(c);
         }
-        rotate(deformed, c->x + 3 * i);
+        /* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
+        double *out = c->x + 3 * i;
+        const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)};
+        double sine, cosine;
+        drape_sin_cos(0.7, &sine, &cosine);
+        double along = k[0] * deformed[0] + k[1] * deformed[1] + k[2] * deformed[2];
+        const double cross[3] = {k[1] * deformed[2] - k[2] * deformed[1],
+                                 k[2] * deformed[0] - k[0] * deformed[2],
+                                 k[0] * deformed[1] - k[1] * deformed[0]};
+        for (int j = 0; j < 3; j++)
+            out[j] = cosine * deformed[j] + sine * cross[j] + (1 - cosine) * along * k[j];
     }
     memcpy(c->internal, rest->internal, (size_t)m->internal_count * sizeof *c->internal);
-    extend_branches(c);
+    /* Maxwell branches are extended as strains are, and were so a part of their time ago. */
+    for (int32_t t = 0; t < c->model->term_count; t++) {
+        const drape_term *term = &c->model->terms[t];
+        double *kept = c->internal + term->first_branch;
+        for (int64_t i = 1 + term->elements.count; i < drape_term_branch_numbers(term); i++)
+            kept[i] = DEFORMATION * uniform(c);
+        if (term->branch_count > 0)
+            kept[0] = -0.7 * term->branches[0].time;
+    }
     for (int64_t i = 0; i < m->measure_count; i++)
         c->history[i] = uniform(c);
 }
@@ -276,20 +269,6 @@ static errors compare_element(const checker *c, const drape_term *term, int32_t 
     return best;
 }
 
-/* The smallest scales of an element's errors: MIN_SCALE of the term's largest derivatives, over every
- * stride-th element. */
-static errors min_scale(const checker *c, const drape_term *term, int32_t stride)
-{
-    errors max = {0};
-    for (int32_t e = 0; e < term->elements.count; e += stride) {
-        local here;
-        evaluate(c, term, e, &here);
-        max = largest_of(max, size_of(c, term, &here));
-    }
-    return (errors){MIN_SCALE * max.gradient, MIN_SCALE * max.hessian, MIN_SCALE * max.velocity,
-                    MIN_SCALE * max.symmetry};
-}
-
 /* T of one element and its gradients. */
 static double kinetic_of(const checker *c, const drape_term *term, int32_t e, double *by_x, double *by_v)
 {
@@ -330,7 +309,15 @@ static void check_elements(checker *c, const drape_term *term)
     errors max = {0};
     int32_t stride = term->elements.count / SAMPLE + 1;
     for (c->progress = drape_term_is_timed(term) ? 0 : 1; c->progress <= 1; c->progress += 0.5) {
-        const errors min = min_scale(c, term, stride);
+        /* The smallest scales of an element's errors: MIN_SCALE of the term's largest derivatives, over
+         * every stride-th element. */
+        for (int32_t e = 0; e < term->elements.count; e += stride) {
+            local here;
+            evaluate(c, term, e, &here);
+            max = largest_of(max, size_of(c, term, &here));
+        }
+        const errors min = {MIN_SCALE * max.gradient, MIN_SCALE * max.hessian, MIN_SCALE * max.velocity,
+                            MIN_SCALE * max.symmetry};
         for (int32_t e = 0; e < term->elements.count; e += stride)
             max = largest_of(max, compare_element(c, term, e, min));
     }
@@ -378,23 +365,6 @@ static void check_invariance(checker *c, int32_t t)
                INVARIANCE_LIMIT);
 }
 
-/* At one state, with a difference along each of the law's arguments. */
-static void check_law(checker *c, const drape_term *law)
-{
-    const double k = 2.385, at = 0.117, moves = -0.731, h = DIFFERENCE_STEP;
-    const double stiffness[] = {k, k, k, k, k}, strain[] = {at, at + h, at - h, at, at},
-                 rate[] = {moves, moves, moves, moves + h, moves - h};
-    double f[5] = {0}, fs[5] = {0}, fr[5] = {0}, e[5] = {0};
-    law->ops->law(law->params, 5, stiffness, strain, rate, f, fs, fr, e);
-    double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
-    double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
-    report(c, law->ops->entry.name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
-    report(c, law->ops->entry.name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
-    if (!law->ops->dissipative)
-        report(c, law->ops->entry.name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
-               GRADIENT_LIMIT);
-}
-
 /* ---- The assembled Jacobian ---- */
 
 /* x2, v2 = the state moved by s along direction at the free nodes; v moves by weight times that. */
@@ -419,21 +389,6 @@ static drape_status prepare_jacobian(checker *c, const drape_point *point)
     c->values =
         drape_arena_take(c->arena, (size_t)drape_system_pattern(c->system)->nonzeros, sizeof *c->values);
     return c->values ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-/* y = J p over the free DOFs; y (node_count x 3). */
-static void multiply(const checker *c, double *y)
-{
-    const drape_model *m = c->model;
-    const drape_pattern *pattern = drape_system_pattern(c->system);
-    memset(y, 0, 3 * (size_t)m->node_count * sizeof *y);
-    for (int64_t j = 0; j < pattern->n; j++) {
-        double p = c->direction[3 * (int64_t)m->node_of_free[j / 3] + j % 3];
-        for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++) {
-            int64_t i = drape_pattern_row(pattern, j, k);
-            y[3 * (int64_t)m->node_of_free[i / 3] + i % 3] += c->values[k] * p;
-        }
-    }
 }
 
 /* The force that a Jacobian belongs to. */
@@ -473,7 +428,18 @@ static double direction_error(checker *c, double step, drape_point point, force 
         move(c, k % 2 ? -s : s, point.weight);
         of(c->system, &point, c->beside[k]);
     }
-    multiply(c, c->g2);
+    /* y = J p over the free DOFs; y (node_count x 3). */
+    double *y = c->g2;
+    const drape_model *m = c->model;
+    const drape_pattern *pattern = drape_system_pattern(c->system);
+    memset(y, 0, 3 * (size_t)m->node_count * sizeof *y);
+    for (int64_t j = 0; j < pattern->n; j++) {
+        double p = c->direction[3 * (int64_t)m->node_of_free[j / 3] + j % 3];
+        for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++) {
+            int64_t i = drape_pattern_row(pattern, j, k);
+            y[3 * (int64_t)m->node_of_free[i / 3] + i % 3] += c->values[k] * p;
+        }
+    }
     for (size_t i = 0; i < n; i++)
         error = fmax(error, c->model->pinned[i / 3] ? 0 : component_error(c, i, step, c->g2[i]));
     return error < INFINITY ? ratio(error, largest(c->g2, n) + error) : INFINITY;
@@ -639,28 +605,28 @@ static double turning_time(const drape_model *model)
     return 0;
 }
 
-static drape_status allocate(checker *c, drape_arena *arena)
-{
-    size_t n = 3 * (size_t)c->model->node_count, measures = (size_t)c->model->measure_count;
-    double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        *arrays[i] = drape_arena_take(arena, n, sizeof(double));
-    for (int i = 0; i < 2 * LEVELS; i++)
-        c->beside[i] = drape_arena_take(arena, n, sizeof(double));
-    c->internal = drape_arena_take(arena, (size_t)c->model->internal_count, sizeof(double));
-    c->history = drape_arena_take(arena, measures, sizeof(double));
-    c->arena = arena;
-    return drape_arena_status(arena);
-}
-
 static drape_status check_terms(drape_context *ctx, checker *c)
 {
     drape_status status = DRAPE_OK;
     for (int32_t t = 0; t < c->model->term_count && !(status = drape_check_cancel(ctx)); t++) {
         const drape_term *term = &c->model->terms[t];
-        if (term->ops->law)
-            check_law(c, term);
-        else
+        if (term->ops->law) {
+            /* At one state, with a difference along each of the law's arguments. */
+            const double k = 2.385, at = 0.117, moves = -0.731, h = DIFFERENCE_STEP;
+            const double stiffness[] = {k, k, k, k, k}, strain[] = {at, at + h, at - h, at, at},
+                         rate[] = {moves, moves, moves, moves + h, moves - h};
+            double f[5] = {0}, fs[5] = {0}, fr[5] = {0}, e[5] = {0};
+            term->ops->law(term->params, 5, stiffness, strain, rate, f, fs, fr, e);
+            double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
+            double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
+            report(c, term->ops->entry.name, "force by strain", ratio(fabs(by_strain - fs[0]), scale),
+                   HESSIAN_LIMIT);
+            report(c, term->ops->entry.name, "force by rate", ratio(fabs(by_rate - fr[0]), scale),
+                   HESSIAN_LIMIT);
+            if (!term->ops->dissipative)
+                report(c, term->ops->entry.name, "force of energy",
+                       ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale), GRADIENT_LIMIT);
+        } else
             check_elements(c, term);
         if (term->ops->measure || (term->seam >= 0 && term->ops->energy && !term->ops->external))
             check_invariance(c, t);
@@ -682,8 +648,18 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
                  .t = turning_time(model)};
     *result_count = 0;
     drape_status status = drape_state_create(&arena, model, &rest);
-    if (!status)
-        status = allocate(&c, &arena);
+    if (!status) {
+        size_t n = 3 * (size_t)c.model->node_count, measures = (size_t)c.model->measure_count;
+        double **arrays[] = {&c.x, &c.v, &c.x2, &c.v2, &c.g1, &c.g2, &c.direction};
+        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+            *arrays[i] = drape_arena_take(&arena, n, sizeof(double));
+        for (int i = 0; i < 2 * LEVELS; i++)
+            c.beside[i] = drape_arena_take(&arena, n, sizeof(double));
+        c.internal = drape_arena_take(&arena, (size_t)c.model->internal_count, sizeof(double));
+        c.history = drape_arena_take(&arena, measures, sizeof(double));
+        c.arena = &arena;
+        status = drape_arena_status(&arena);
+    }
     if (!status) {
         make_state(&c, &rest);
         status = check_terms(ctx, &c);

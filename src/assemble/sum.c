@@ -46,46 +46,19 @@ static int32_t block_count(const drape_term *term)
 
 /* ---- Creation ---- */
 
-static reach reach_of(const drape_coupling *pieces, int32_t block)
-{
-    const int32_t *node = pieces->node + (size_t)block * DRAPE_BLOCK * (size_t)pieces->nodes;
-    reach r = {node[0], node[0]};
-    for (int32_t i = 1; i < count_in(pieces->count, block) * pieces->nodes; i++) {
-        r.low = node[i] < r.low ? node[i] : r.low;
-        r.high = node[i] > r.high ? node[i] : r.high;
-    }
-    return r;
-}
-
 static reach *reaches_of(drape_arena *arena, const drape_coupling *pieces)
 {
     reach *of = drape_arena_take(arena, (size_t)blocks_of(pieces->count), sizeof *of);
-    for (int32_t k = 0; of && k < blocks_of(pieces->count); k++)
-        of[k] = reach_of(pieces, k);
+    for (int32_t k = 0; of && k < blocks_of(pieces->count); k++) {
+        const int32_t *node = pieces->node + (size_t)k * DRAPE_BLOCK * (size_t)pieces->nodes;
+        reach r = {node[0], node[0]};
+        for (int32_t i = 1; i < count_in(pieces->count, k) * pieces->nodes; i++) {
+            r.low = node[i] < r.low ? node[i] : r.low;
+            r.high = node[i] > r.high ? node[i] : r.high;
+        }
+        of[k] = r;
+    }
     return of;
-}
-
-static void find_reaches(drape_arena *arena, drape_summer *s)
-{
-    const size_t terms = (size_t)s->model->term_count;
-    s->reaches = drape_arena_take(arena, terms, sizeof *s->reaches);
-    s->patches = drape_arena_take(arena, terms, sizeof *s->patches);
-    for (size_t i = 0; s->reaches && s->patches && i < terms; i++) {
-        const drape_coupling pieces = drape_term_pieces(&s->model->terms[i]),
-                             patches = drape_term_patches(&s->model->terms[i]);
-        s->reaches[i] = reaches_of(arena, &pieces);
-        if (s->parts[i])
-            s->patches[i] = reaches_of(arena, &patches);
-    }
-}
-
-static void create_parts(drape_arena *arena, drape_summer *s)
-{
-    s->parts = drape_arena_take(arena, (size_t)s->model->term_count, sizeof *s->parts);
-    for (int32_t i = 0; s->parts && i < s->model->term_count; i++) {
-        s->parts[i] = drape_parts_create(arena, &s->model->terms[i]);
-        s->has_parts = s->has_parts || s->parts[i];
-    }
 }
 
 drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_pool *pool,
@@ -96,9 +69,23 @@ drape_status drape_summer_create(drape_arena *arena, const drape_model *model, d
         return DRAPE_E_MEMORY;
     *s = (drape_summer){.model = model, .pool = pool, .threads = drape_pool_threads(pool)};
     s->blocks = drape_arena_take(arena, (size_t)s->threads, sizeof *s->blocks);
-    create_parts(arena, s);
-    if (s->threads > 1 && s->parts)
-        find_reaches(arena, s);
+    s->parts = drape_arena_take(arena, (size_t)s->model->term_count, sizeof *s->parts);
+    for (int32_t i = 0; s->parts && i < s->model->term_count; i++) {
+        s->parts[i] = drape_parts_create(arena, &s->model->terms[i]);
+        s->has_parts = s->has_parts || s->parts[i];
+    }
+    if (s->threads > 1 && s->parts) {
+        const size_t terms = (size_t)s->model->term_count;
+        s->reaches = drape_arena_take(arena, terms, sizeof *s->reaches);
+        s->patches = drape_arena_take(arena, terms, sizeof *s->patches);
+        for (size_t i = 0; s->reaches && s->patches && i < terms; i++) {
+            const drape_coupling pieces = drape_term_pieces(&s->model->terms[i]),
+                                 patches = drape_term_patches(&s->model->terms[i]);
+            s->reaches[i] = reaches_of(arena, &pieces);
+            if (s->parts[i])
+                s->patches[i] = reaches_of(arena, &patches);
+        }
+    }
     return drape_arena_status(arena);
 }
 
@@ -306,17 +293,6 @@ static void evaluate(const drape_summer *s, const drape_term *term, const drape_
         drape_block_evaluate(term, want, b);
 }
 
-static void clear(const drape_summer *s, const share *own, const drape_sums *to)
-{
-    if (to->g)
-        memset(to->g + 3 * (size_t)own->first, 0, 3 * (size_t)(own->last - own->first) * sizeof *to->g);
-    for (int32_t node = own->first; to->values && node < own->last; node++)
-        if (s->model->free_of_node[node] >= 0) {
-            const drape_block_column col = column_of(to, s->model->free_of_node[node]);
-            memset(col.start, 0, 3 * (size_t)col.stride * sizeof *col.start);
-        }
-}
-
 static bool is_wanted(const drape_summer *s, int32_t term, const drape_request *want, const drape_sums *to)
 {
     return !(want->without && want->without[term]) && contributes(s, &s->model->terms[term], want, to);
@@ -333,7 +309,13 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     const int64_t nodes = s->model->node_count;
     const share own = {(int32_t)(nodes * thread / s->threads), (int32_t)(nodes * (thread + 1) / s->threads)};
     drape_block *b = &s->blocks[thread];
-    clear(s, &own, to);
+    if (to->g)
+        memset(to->g + 3 * (size_t)own.first, 0, 3 * (size_t)(own.last - own.first) * sizeof *to->g);
+    for (int32_t node = own.first; to->values && node < own.last; node++)
+        if (s->model->free_of_node[node] >= 0) {
+            const drape_block_column col = column_of(to, s->model->free_of_node[node]);
+            memset(col.start, 0, 3 * (size_t)col.stride * sizeof *col.start);
+        }
     for (int32_t i = 0; i < s->model->term_count; i++) {
         const drape_term *term = &s->model->terms[i];
         if (!is_wanted(s, i, want, to))

@@ -439,23 +439,6 @@ static void forget_extension(drape_system *system)
     system->pattern = &system->model->pattern;
 }
 
-/* Finds the slots of the terms' blocks in the extended pattern. */
-static drape_status place_terms(drape_system *system)
-{
-    const drape_model *model = system->model;
-    drape_arena *arena = &system->extension;
-    system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
-    for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
-        const drape_term *term = &model->terms[i];
-        if (!drape_term_couples(term) || (system->left_out && system->left_out[i]))
-            continue;
-        system->blocks[i] = drape_arena_take(arena, drape_term_places(term), sizeof **system->blocks);
-        if (system->blocks[i])
-            drape_term_place(term, &system->extended, model->free_of_node, system->blocks[i]);
-    }
-    return drape_arena_status(arena);
-}
-
 /* Builds the extended pattern: that of the model, without the terms that are left out, and these pairs of
  * contact (pairs x 4 nodes). */
 static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
@@ -474,8 +457,20 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
                                               couplings, count, &system->extended);
     drape_free(ctx, couplings);
     system->extended.ranks = system->ranks;
-    if (!status)
-        status = place_terms(system);
+    if (!status) {
+        /* Finds the slots of the terms' blocks in the extended pattern. */
+        drape_arena *arena = &system->extension;
+        system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
+        for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
+            const drape_term *term = &model->terms[i];
+            if (!drape_term_couples(term) || (system->left_out && system->left_out[i]))
+                continue;
+            system->blocks[i] = drape_arena_take(arena, drape_term_places(term), sizeof **system->blocks);
+            if (system->blocks[i])
+                drape_term_place(term, &system->extended, model->free_of_node, system->blocks[i]);
+        }
+        status = drape_arena_status(arena);
+    }
     if (status) /* back to the model's pattern, which also differs from the one before this call */
         forget_extension(system);
     else
@@ -1117,8 +1112,8 @@ void drape_system_agree_largest(drape_system *system, double value, drape_diagno
     drape_agree_largest(&system->agreed, system->model, value, diagnostic);
 }
 
-static drape_diagnostic diagnose_dof_here(const drape_system *system, const double *free_vector,
-                                          const char *what, double limit)
+drape_diagnostic drape_system_diagnose_dof(drape_system *system, const double *free_vector, const char *what,
+                                           double limit)
 {
     const drape_model *model = system->model;
     int64_t largest = 0;
@@ -1131,74 +1126,18 @@ static drape_diagnostic diagnose_dof_here(const drape_system *system, const doub
             largest = i;
     }
     int32_t node = model->free_count > 0 ? model->node_of_free[largest / 3] : -1;
-    return (drape_diagnostic){.what = what,
+    drape_diagnostic found = {.what = what,
                               .term = "",
                               .element = -1,
                               .node = {node, -1, -1, -1},
                               .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
                               .value = model->free_count > 0 ? fabs(free_vector[largest]) : 0,
                               .limit = limit};
-}
-
-drape_diagnostic drape_system_diagnose_dof(drape_system *system, const double *free_vector, const char *what,
-                                           double limit)
-{
-    drape_diagnostic found = diagnose_dof_here(system, free_vector, what, limit);
     drape_agree_largest(&system->agreed, system->model, found.value, &found);
     return found;
 }
 
 /* ---- Checkpoints ---- */
-
-static bool is_spring(const drape_model *m, const drape_drag_spring *spring)
-{
-    return spring->node >= 0 && spring->node < m->node_count && !m->pinned[spring->node] &&
-           spring->stiffness > 0 && isfinite(spring->stiffness) && drape_all_finite(spring->target, 3);
-}
-
-static void archive_drag_springs(drape_system *system, drape_archive *a)
-{
-    drape_archive_int32(a, &system->drag.count);
-    if (drape_archive_good(a) && !(system->drag.count >= 0 && system->drag.count <= DRAPE_MAX_DRAG_SPRINGS)) {
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d drag springs", (int)system->drag.count);
-        system->drag.count = 0;
-    }
-    for (int32_t i = 0; i < system->drag.count && drape_archive_good(a); i++) {
-        drape_drag_spring *spring = &system->drag.spring[i];
-        drape_archive_int32(a, &spring->node);
-        drape_archive_double(a, &spring->stiffness);
-        drape_archive_doubles(a, spring->target, 3);
-        if (drape_archive_has_read(a) && !is_spring(system->model, spring))
-            drape_archive_fail(a, DRAPE_E_PARSE,
-                               "the checkpoint has a drag spring on node %d that cannot be there",
-                               (int)spring->node);
-    }
-}
-
-static void archive_push(drape_system *system, drape_archive *a)
-{
-    const size_t n = 3 * (size_t)system->model->node_count;
-    drape_archive_bool(a, &system->pushed);
-    if (system->pushed)
-        drape_archive_doubles(a, system->push, n);
-    if (drape_archive_has_read(a) && !drape_all_finite(system->push, n))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
-}
-
-/* Contact, and the pairs that the extended pattern was built from: they belong to an earlier state, so they
- * cannot be found again from the present one. */
-static void archive_contact(drape_system *system, drape_archive *a)
-{
-    bool extended = system->blocks != NULL;
-    const int32_t *nodes = NULL;
-    if (system->contact)
-        drape_contact_archive(system->contact, a);
-    drape_archive_bool(a, &extended);
-    if (!drape_archive_has_read(a) || !system->contact || !extended)
-        return;
-    int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
-    drape_archive_note(a, extend(system, pairs, nodes));
-}
 
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
@@ -1209,10 +1148,42 @@ void drape_system_archive(drape_system *system, drape_archive *a)
         return;
     }
     drape_motion_archive(system->motion, a);
-    archive_drag_springs(system, a);
-    archive_push(system, a);
+    drape_archive_int32(a, &system->drag.count);
+    if (drape_archive_good(a) && !(system->drag.count >= 0 && system->drag.count <= DRAPE_MAX_DRAG_SPRINGS)) {
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d drag springs", (int)system->drag.count);
+        system->drag.count = 0;
+    }
+    for (int32_t i = 0; i < system->drag.count && drape_archive_good(a); i++) {
+        drape_drag_spring *spring = &system->drag.spring[i];
+        drape_archive_int32(a, &spring->node);
+        drape_archive_double(a, &spring->stiffness);
+        drape_archive_doubles(a, spring->target, 3);
+        if (drape_archive_has_read(a) &&
+            !(spring->node >= 0 && spring->node < system->model->node_count &&
+              !system->model->pinned[spring->node] && spring->stiffness > 0 && isfinite(spring->stiffness) &&
+              drape_all_finite(spring->target, 3)))
+            drape_archive_fail(a, DRAPE_E_PARSE,
+                               "the checkpoint has a drag spring on node %d that cannot be there",
+                               (int)spring->node);
+    }
+    const size_t n = 3 * (size_t)system->model->node_count;
+    drape_archive_bool(a, &system->pushed);
+    if (system->pushed)
+        drape_archive_doubles(a, system->push, n);
+    if (drape_archive_has_read(a) && !drape_all_finite(system->push, n))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
     drape_archive_same(a, "whether there is contact", system->contact != NULL);
-    archive_contact(system, a);
+    /* Contact, and the pairs that the extended pattern was built from: they belong to an earlier state, so
+     * they cannot be found again from the present one. */
+    bool extended = system->blocks != NULL;
+    const int32_t *nodes = NULL;
+    if (system->contact)
+        drape_contact_archive(system->contact, a);
+    drape_archive_bool(a, &extended);
+    if (!drape_archive_has_read(a) || !system->contact || !extended)
+        return;
+    int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
+    drape_archive_note(a, extend(system, pairs, nodes));
 }
 
 /* ---- Another system goes on ---- */

@@ -120,17 +120,6 @@ drape_status drape_active_set_add(drape_active_set *set, const drape_active_cont
     return DRAPE_OK;
 }
 
-static bool note_near(drape_active_set *set, const drape_pair *pair, double gap)
-{
-    drape_near_pair *near =
-        drape_list_grow(set->arena, set->near, set->near_count, &set->near_room, sizeof *near);
-    if (!near)
-        return false;
-    set->near = near;
-    set->near[set->near_count++] = (drape_near_pair){.pair = *pair, .gap = gap};
-    return true;
-}
-
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
                                    const drape_inside_pairs *inside, bool all_inside,
@@ -154,8 +143,12 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
                              drape_inside_has(inside, pair);
-            if (!note_near(set, pair, contact.gap.value))
+            drape_near_pair *near =
+                drape_list_grow(set->arena, set->near, set->near_count, &set->near_room, sizeof *near);
+            if (!near)
                 return DRAPE_E_MEMORY;
+            set->near = near;
+            set->near[set->near_count++] = (drape_near_pair){.pair = *pair, .gap = contact.gap.value};
         }
         reduce(&contact);
         if (drape_active_set_add(set, &contact))

@@ -15,38 +15,6 @@
 
 /* ---- Creation ---- */
 
-static void count_features(const drape_model *m, int32_t *points, int32_t *segments, int32_t *triangles)
-{
-    *points = *segments = *triangles = 0;
-    for (int32_t i = 0; i < m->collider_count; i++) {
-        const drape_collider *c = &m->colliders[i];
-        *points += c->shape.point_count;
-        *segments += c->shape.segment_count;
-        *triangles += c->ops->smooth ? 0 : c->shape.triangle_count;
-    }
-}
-
-static void list_collider(drape_broad_phase *s, int32_t collider, int32_t first, int32_t *segments,
-                          int32_t *triangles)
-{
-    const drape_collider *c = &s->model->colliders[collider];
-    if (c->shape.point_count > 0)
-        memcpy(s->rest + 3 * (size_t)first, c->shape.point,
-               3 * (size_t)c->shape.point_count * sizeof *s->rest);
-    for (int32_t p = 0; p < c->shape.point_count; p++)
-        s->point_collider[first - s->model->node_count + p] = collider;
-    for (int32_t k = 0; k < 2 * c->shape.segment_count; k++)
-        s->segment[2 * (size_t)*segments + (size_t)k] = c->shape.segment[k] + first;
-    for (int32_t k = 0; k < c->shape.segment_count; k++)
-        s->segment_collider[*segments + k] = collider;
-    *segments += c->shape.segment_count;
-    for (int32_t k = 0; !c->ops->smooth && k < 3 * c->shape.triangle_count; k++)
-        s->triangle[3 * (size_t)*triangles + (size_t)k] = c->shape.triangle[k] + first;
-    for (int32_t k = 0; !c->ops->smooth && k < c->shape.triangle_count; k++)
-        s->triangle_collider[*triangles + k] = collider;
-    *triangles += c->ops->smooth ? 0 : c->shape.triangle_count;
-}
-
 static void list_features(drape_broad_phase *s)
 {
     int32_t first = s->model->node_count, segments = 0, triangles = 0;
@@ -55,32 +23,24 @@ static void list_features(drape_broad_phase *s)
         s->point[i] = i;
     for (int32_t i = 0; i < s->model->collider_count; i++) {
         s->first_point[i] = first;
-        list_collider(s, i, first, &segments, &triangles);
+        const drape_collider *c = &s->model->colliders[i];
+        if (c->shape.point_count > 0)
+            memcpy(s->rest + 3 * (size_t)first, c->shape.point,
+                   3 * (size_t)c->shape.point_count * sizeof *s->rest);
+        for (int32_t p = 0; p < c->shape.point_count; p++)
+            s->point_collider[first - s->model->node_count + p] = i;
+        for (int32_t k = 0; k < 2 * c->shape.segment_count; k++)
+            s->segment[2 * (size_t)segments + (size_t)k] = c->shape.segment[k] + first;
+        for (int32_t k = 0; k < c->shape.segment_count; k++)
+            s->segment_collider[segments + k] = i;
+        segments += c->shape.segment_count;
+        for (int32_t k = 0; !c->ops->smooth && k < 3 * c->shape.triangle_count; k++)
+            s->triangle[3 * (size_t)triangles + (size_t)k] = c->shape.triangle[k] + first;
+        for (int32_t k = 0; !c->ops->smooth && k < c->shape.triangle_count; k++)
+            s->triangle_collider[triangles + k] = i;
+        triangles += c->ops->smooth ? 0 : c->shape.triangle_count;
         first += s->model->colliders[i].shape.point_count;
     }
-}
-
-static double area_of(const double *x, const int32_t *node)
-{
-    double a[3], b[3];
-    for (size_t k = 0; k < 3; k++) {
-        a[k] = x[3 * (size_t)node[1] + k] - x[3 * (size_t)node[0] + k];
-        b[k] = x[3 * (size_t)node[2] + k] - x[3 * (size_t)node[0] + k];
-    }
-    double c[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    return 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
-}
-
-/* Nodes that another rank owns have triangles there. */
-static void fetch_areas(drape_broad_phase *s)
-{
-    const drape_ranks *ranks = drape_model_ranks(s->model);
-    const int32_t nodes = ranks ? s->model->node_count : 0;
-    for (int32_t i = 0; i < nodes; i++) /* rest is filled after this */
-        s->rest[3 * (size_t)i] = s->node_area[i];
-    drape_ranks_fetch(ranks, s->rest);
-    for (int32_t i = 0; i < nodes; i++)
-        s->node_area[i] = s->rest[3 * (size_t)i];
 }
 
 /* A node gets a third of the area of its triangles, an edge the mean of its two nodes. */
@@ -89,11 +49,25 @@ static void share_areas(drape_broad_phase *s)
     const drape_model *m = s->model;
     for (int32_t f = 0; f < m->triangle_count; f++) {
         const int32_t *node = m->triangle + 3 * (size_t)f;
-        s->face_area[f] = area_of(m->rest, node);
+        const double *x = m->rest;
+        double u[3], w[3];
+        for (size_t k = 0; k < 3; k++) {
+            u[k] = x[3 * (size_t)node[1] + k] - x[3 * (size_t)node[0] + k];
+            w[k] = x[3 * (size_t)node[2] + k] - x[3 * (size_t)node[0] + k];
+        }
+        double c[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+        s->face_area[f] = 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
         for (int a = 0; a < 3; a++)
             s->node_area[node[a]] += s->face_area[f] / 3;
     }
-    fetch_areas(s);
+    /* Nodes that another rank owns have triangles there. */
+    const drape_ranks *ranks = drape_model_ranks(s->model);
+    const int32_t nodes = ranks ? s->model->node_count : 0;
+    for (int32_t i = 0; i < nodes; i++) /* rest is filled after this */
+        s->rest[3 * (size_t)i] = s->node_area[i];
+    drape_ranks_fetch(ranks, s->rest);
+    for (int32_t i = 0; i < nodes; i++)
+        s->node_area[i] = s->rest[3 * (size_t)i];
     for (int32_t e = 0; e < m->edge_count; e++)
         s->edge_area[e] =
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
@@ -105,20 +79,6 @@ static double sag(double r, double edge)
 {
     const double half = 0.5 * edge;
     return half < r ? r - sqrt(r * r - half * half) : half;
-}
-
-static void bound_features(drape_broad_phase *s)
-{
-    const drape_model *m = s->model;
-    double edge = 0;
-    for (int32_t e = 0; e < m->edge_count; e++)
-        edge = fmax(edge, m->edge_length[e]);
-    for (int32_t i = 0; i < m->collider_count; i++) {
-        s->distance[i] = drape_collider_activation(m, i);
-        s->feature_most[i] = m->colliders[i].ops->smooth
-                                 ? fmax(s->distance[i], SAGS * sag(m->colliders[i].shape.radius, edge))
-                                 : INFINITY;
-    }
 }
 
 /* Trees of what can meet something. */
@@ -146,7 +106,13 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
 {
     int32_t points, triangles;
     *s = (drape_broad_phase){.model = m};
-    count_features(m, &points, &s->segments, &triangles);
+    points = s->segments = triangles = 0;
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        const drape_collider *c = &m->colliders[i];
+        points += c->shape.point_count;
+        s->segments += c->shape.segment_count;
+        triangles += c->ops->smooth ? 0 : c->shape.triangle_count;
+    }
     s->points = m->node_count + points;
     s->rest = drape_arena_take(arena, 3 * (size_t)s->points, sizeof *s->rest);
     s->point_collider = drape_arena_take(arena, (size_t)points, sizeof *s->point_collider);
@@ -176,7 +142,15 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->face_area = drape_arena_take(arena, (size_t)m->triangle_count, sizeof *s->face_area);
     if (drape_ranks_agree_memory(drape_model_ranks(m), arena->ctx, !drape_arena_status(arena)))
         return DRAPE_E_MEMORY;
-    bound_features(s);
+    double edge = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        edge = fmax(edge, m->edge_length[e]);
+    for (int32_t i = 0; i < m->collider_count; i++) {
+        s->distance[i] = drape_collider_activation(m, i);
+        s->feature_most[i] = m->colliders[i].ops->smooth
+                                 ? fmax(s->distance[i], SAGS * sag(m->colliders[i].shape.radius, edge))
+                                 : INFINITY;
+    }
     for (int32_t i = 0; i < m->collider_count; i++)
         if (!m->colliders[i].ops->smooth)
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
@@ -358,54 +332,6 @@ static void set_reaches(drape_broad_phase *s, bool passing)
         }
 }
 
-static void fit(drape_broad_phase *s, const drape_broad_query *want)
-{
-    const struct {
-        drape_path_bvh *tree;
-        const double *reach;
-    } of[] = {{&s->nodes, NULL},
-              {&s->faces, NULL},
-              {&s->edges, NULL},
-              {&s->corners, s->corner_reach},
-              {&s->segment_tree, s->segment_reach},
-              {&s->obstacles, s->obstacle_reach}};
-    set_reaches(s, want->passing);
-    for (size_t i = 0; i < sizeof of / sizeof *of; i++)
-        drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
-}
-
-/* Neighbours at rest have an activation distance of at most half of their distance there
- * (drape_pair_activation_distance), unless the start is untangled. */
-static void search_self(query *q)
-{
-    drape_broad_phase *s = q->broad;
-    const drape_broad_query *want = q->want;
-    const double distance = 2 * s->model->contact.self_thickness;
-    const drape_self_query layers = {
-        .x = want->x,
-        .y = want->y,
-        .reach = drape_broad_phase_wanted(s, want->passing, distance) + want->reach,
-        .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
-        .rounding = s->rounding,
-        .marked = want->marked};
-    self_query both = {*q, *q};
-    begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
-    begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
-    both.face.pair.distance = both.edge.pair.distance = distance;
-    drape_self_search_pairs(&s->layers, &layers, meet_own_face, meet_own_edge, &both);
-}
-
-static void search_features(query *q)
-{
-    drape_broad_phase *s = q->broad;
-    begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
-    drape_path_bvh_join(&s->corners, &s->faces, q->want->y, q->want->reach, meet_face, q);
-    begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
-    drape_path_bvh_join(&s->segment_tree, &s->edges, q->want->y, q->want->reach, meet_edge, q);
-    begin_stage(q, OBSTACLES, DRAPE_PAIR_TRIANGLE);
-    drape_path_bvh_join(&s->nodes, &s->obstacles, q->want->y, q->want->reach, meet_obstacle, q);
-}
-
 /* A feature whose elements of cloth are scanned. */
 typedef struct scan {
     query *query;
@@ -509,35 +435,6 @@ static double gap_of_nodes(double radius, double gap, double edge)
     return sqrt((radius + gap) * (radius + gap) + edge * edge / 3) - radius;
 }
 
-/* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one is close.
- * All of them if it turns: its features move straight, which is no straight path in its coordinates. Returns
- * their number. */
-static int32_t list_near(drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
-                         const scanned_cloth *of)
-{
-    const drape_collider_pose *const pose[2] = {&want->pose[0][collider],
-                                                &want->pose[want->y ? 1 : 0][collider]};
-    const bool turns = (pose[0]->turned || pose[1]->turned) &&
-                       memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-    const double gap = feature_reach(s, collider, want->passing) + want->reach, reach = gap + of->edge,
-                 close = gap_of_nodes(s->model->colliders[collider].shape.radius, gap, of->edge);
-    int32_t count = 0;
-    if (of->node || turns)
-        memset(s->near, of->node ? 0 : 1, (size_t)s->model->node_count * sizeof *s->near);
-    else
-        drape_distant_mark(&s->distant, collider, pose, reach, s->near);
-    for (int32_t i = 0; i < of->nodes; i++) {
-        const int32_t node = of->node ? of->node[i] : i;
-        if (!of->node && !s->near[node])
-            continue;
-        s->near[node] = turns || !is_distant(s, want, collider, node, reach);
-        s->close[node] = turns || (s->near[node] && !is_distant(s, want, collider, node, close));
-        s->near_node[count] = node;
-        count += s->near[node];
-    }
-    return count;
-}
-
 /* Lists those elements of a tree all of whose nodes are near, and one is close: each at the first node that
  * is. */
 static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
@@ -593,7 +490,29 @@ static void scan_features(query *q)
         scanned_cloth *of = only_marked ? &some : &all;
         if (of->edge < 0)
             *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
-        const int32_t points = list_near(s, q->want, k, of);
+        /* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one
+         * is close. All of them if it turns: its features move straight, which is no straight path in its
+         * coordinates. */
+        const drape_broad_query *want = q->want;
+        const drape_collider_pose *const pose[2] = {&want->pose[0][k], &want->pose[want->y ? 1 : 0][k]};
+        const bool turns = (pose[0]->turned || pose[1]->turned) &&
+                           memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
+        const double gap = feature_reach(s, k, want->passing) + want->reach, reach = gap + of->edge,
+                     close = gap_of_nodes(s->model->colliders[k].shape.radius, gap, of->edge);
+        int32_t points = 0;
+        if (of->node || turns)
+            memset(s->near, of->node ? 0 : 1, (size_t)s->model->node_count * sizeof *s->near);
+        else
+            drape_distant_mark(&s->distant, k, pose, reach, s->near);
+        for (int32_t i = 0; i < of->nodes; i++) {
+            const int32_t node = of->node ? of->node[i] : i;
+            if (!of->node && !s->near[node])
+                continue;
+            s->near[node] = turns || !is_distant(s, want, k, node, reach);
+            s->close[node] = turns || (s->near[node] && !is_distant(s, want, k, node, close));
+            s->near_node[points] = node;
+            points += s->near[node];
+        }
         begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
         drape_path_elements among = list_elements(s, &s->faces, &s->faces_of, points);
         for (int32_t i = corner; among.elements > 0 && i < corner + shape->point_count; i++)
@@ -610,12 +529,43 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
                              drape_broad_phase_visit *visit, void *user)
 {
     query q = {.broad = s, .want = want, .visit = visit, .user = user};
-    if (s->model->contact.self)
-        search_self(&q);
+    if (s->model->contact.self) {
+        /* Neighbours at rest have an activation distance of at most half of their distance there
+         * (drape_pair_activation_distance), unless the start is untangled. */
+        const double distance = 2 * s->model->contact.self_thickness;
+        const drape_self_query layers = {
+            .x = want->x,
+            .y = want->y,
+            .reach = drape_broad_phase_wanted(s, want->passing, distance) + want->reach,
+            .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
+            .rounding = s->rounding,
+            .marked = want->marked};
+        self_query both = {*&q, q};
+        begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
+        begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
+        both.face.pair.distance = both.edge.pair.distance = distance;
+        drape_self_search_pairs(&s->layers, &layers, meet_own_face, meet_own_edge, &both);
+    }
     if (s->corners.count + s->segments <= FEW && s->obstacles.count == 0) {
         scan_features(&q);
         return;
     }
-    fit(s, want);
-    search_features(&q);
+    const struct {
+        drape_path_bvh *tree;
+        const double *reach;
+    } of[] = {{&s->nodes, NULL},
+              {&s->faces, NULL},
+              {&s->edges, NULL},
+              {&s->corners, s->corner_reach},
+              {&s->segment_tree, s->segment_reach},
+              {&s->obstacles, s->obstacle_reach}};
+    set_reaches(s, want->passing);
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+        drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
+    begin_stage(&q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->corners, &s->faces, q.want->y, q.want->reach, meet_face, &q);
+    begin_stage(&q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+    drape_path_bvh_join(&s->segment_tree, &s->edges, q.want->y, q.want->reach, meet_edge, &q);
+    begin_stage(&q, OBSTACLES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->nodes, &s->obstacles, q.want->y, q.want->reach, meet_obstacle, &q);
 }

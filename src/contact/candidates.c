@@ -10,24 +10,21 @@
 
 #define MAX_PATCH 0.3 /* of the nodes: if more have left their path, all pairs are searched */
 
-static void take_set(drape_arena *arena, const drape_broad_phase *broad, drape_candidate_set *set)
-{
-    set->away =
-        drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count), sizeof *set->away);
-    for (int end = 0; end < 2; end++) {
-        set->x[end] = drape_arena_take(arena, 3 * (size_t)broad->points, sizeof *set->x[end]);
-        set->pose[end] =
-            drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *set->pose[end]);
-    }
-}
-
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out)
 {
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin, .sorter.arena = arena};
     const size_t marks = (size_t)(broad->points + broad->model->collider_count);
-    for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
-        take_set(arena, broad, &out->set[i]);
+    for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++) {
+        drape_candidate_set *set = &out->set[i];
+        set->away = drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count),
+                                     sizeof *set->away);
+        for (int end = 0; end < 2; end++) {
+            set->x[end] = drape_arena_take(arena, 3 * (size_t)broad->points, sizeof *set->x[end]);
+            set->pose[end] =
+                drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *set->pose[end]);
+        }
+    }
     out->level = drape_arena_take(arena, marks, sizeof *out->level);
     out->marked = drape_arena_take(arena, marks, sizeof *out->marked);
     out->beyond = drape_arena_take(arena, marks, sizeof *out->beyond);
@@ -192,23 +189,6 @@ static void add(void *user, const drape_pair *pair)
         return;
     set->pairs = pairs;
     set->pairs[set->count++] = *pair;
-}
-
-static drape_status collect(drape_candidates *c, drape_candidate_set *set, const bool *marked,
-                            const drape_straight_path *path)
-{
-    drape_straight_path own;
-    for (int end = 0; end < 2; end++) {
-        memcpy(set->x[end], path->end[end].x, 3 * (size_t)c->broad->points * sizeof *set->x[end]);
-        memcpy(set->pose[end], path->end[end].pose,
-               (size_t)c->broad->model->collider_count * sizeof *set->pose[end]);
-        own.end[end] =
-            (drape_configuration){.model = c->broad->model, .x = set->x[end], .pose = set->pose[end]};
-    }
-    set->count = 0;
-    set->known = true;
-    drape_candidates_find(c->broad, &own, c->margin, false, marked, add, &(collector){c->arena, set});
-    return set->known ? drape_sort_pairs(&c->sorter, set->pairs, set->count) : DRAPE_E_MEMORY;
 }
 
 /* ---- Distance from the paths ---- */
@@ -422,7 +402,21 @@ drape_status drape_candidates_search(drape_candidates *c, const drape_straight_p
     for (size_t i = 0; i < count; i++)
         c->level[i] = sets > 0 && c->marked[i] ? (uint8_t)sets : sets > 0 ? c->level[i] : 0;
     memset(c->stale, 0, (size_t)c->broad->model->collider_count * sizeof *c->stale);
-    const drape_status status = collect(c, &c->set[sets], sets > 0 ? c->marked : NULL, path);
+    drape_candidate_set *set = &c->set[sets];
+    const bool *marked = sets > 0 ? c->marked : NULL;
+    drape_straight_path own;
+    for (int end = 0; end < 2; end++) {
+        memcpy(set->x[end], path->end[end].x, 3 * (size_t)c->broad->points * sizeof *set->x[end]);
+        memcpy(set->pose[end], path->end[end].pose,
+               (size_t)c->broad->model->collider_count * sizeof *set->pose[end]);
+        own.end[end] =
+            (drape_configuration){.model = c->broad->model, .x = set->x[end], .pose = set->pose[end]};
+    }
+    set->count = 0;
+    set->known = true;
+    drape_candidates_find(c->broad, &own, c->margin, false, marked, add, &(collector){c->arena, set});
+    const drape_status status =
+        set->known ? drape_sort_pairs(&c->sorter, set->pairs, set->count) : DRAPE_E_MEMORY;
     c->sets = status ? 0 : sets + 1;
     return status;
 }

@@ -29,14 +29,6 @@ typedef struct path {
     bool cancelled;                /* pairs have been left out */
 } path;
 
-/* The fraction of a pair that limits the displacement, for each of its nodes. */
-static void share(path *p, const drape_pair *pair, double fraction)
-{
-    for (int k = 0; k < 4; k++)
-        if (pair->node[k] < p->nodes)
-            p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
-}
-
 /* Whether the gap falls below the activation distance on the path; close to that it may be missed. */
 static bool comes_near(const path *p, const drape_pair *pair, double gap)
 {
@@ -99,8 +91,12 @@ static void follow(void *user, const drape_pair *pair)
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
-    if (p->of_node)
-        share(p, pair, fraction);
+    if (p->of_node) {
+        /* The fraction of a pair that limits the displacement, for each of its nodes. */
+        for (int k = 0; k < 4; k++)
+            if (pair->node[k] < p->nodes)
+                p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
+    }
     if (fraction > p->fraction || (fraction == p->fraction && !drape_pair_is_before(pair, &p->limiting)))
         return;
     p->fraction = fraction;
@@ -287,25 +283,6 @@ static double thrown_length(const drape_contact *c, double farthest)
     return farthest > c->model->length ? MAX_THROW * c->mean_edge : INFINITY;
 }
 
-/* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A correction
- * throws nodes so far only if it is of no use there; to search each pair on its own path would take seconds.
- * Returns the least fraction. */
-static double shorten_long(const drape_contact *c, const double *x, const double *y, double *fraction)
-{
-    const double longest =
-        fmin(thrown_length(c, farthest_throw(c, x, y)), DRAPE_LONGEST_SEARCH * c->mean_edge);
-    double least = 1, move[3];
-    for (int32_t i = 0; i < c->model->node_count; i++) {
-        vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
-        const double length = vec3_norm(move);
-        if (!(length > longest))
-            continue;
-        fraction[i] = longest / length;
-        least = fmin(least, fraction[i]);
-    }
-    return drape_ranks_least(c->ranks, least);
-}
-
 /* The fraction that leaves the whole displacement no longer than that. */
 static double shorten_whole(const drape_contact *c, const double *x, const double *y)
 {
@@ -331,7 +308,21 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
     for (int32_t i = 0; again && i < c->model->node_count; i++)
         of_node[i] = 1;
     if (of_node) {
-        const double shortened = shorten_long(c, x, y, of_node);
+        /* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A
+         * correction throws nodes so far only if it is of no use there; to search each pair on its own
+         * path would take seconds. */
+        const double longest =
+            fmin(thrown_length(c, farthest_throw(c, x, y)), DRAPE_LONGEST_SEARCH * c->mean_edge);
+        double least = 1, move[3];
+        for (int32_t i = 0; i < c->model->node_count; i++) {
+            vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
+            const double length = vec3_norm(move);
+            if (!(length > longest))
+                continue;
+            of_node[i] = longest / length;
+            least = fmin(least, of_node[i]);
+        }
+        const double shortened = drape_ranks_least(c->ranks, least);
         if (shortened < 1)
             return shortened;
     }

@@ -101,19 +101,6 @@ static double end_of_piece(const drape_contact *c, double at, double t)
     return pieces > 1 ? at + (end - at) / pieces : end;
 }
 
-/* Whether a node that moves straight in the coordinates of a collider surely keeps the least gap. */
-static bool stays_away(const drape_contact *c, const piece *p, int32_t k, int32_t node, double least)
-{
-    bool away = !c->swing[k].turns;
-    for (int end = 0; away && end < 2; end++) {
-        const drape_configuration *at = &p->path.end[end];
-        double own[3];
-        drape_pose_own(&at->pose[k], at->x + 3 * (size_t)node, own);
-        away = drape_distant_keeps(&c->broad.distant, k, node, own, least);
-    }
-    return away;
-}
-
 static drape_status check_surfaces(drape_contact *c, const piece *p, const char **reason,
                                    drape_diagnostic *diagnostic)
 {
@@ -125,7 +112,16 @@ static drape_status check_surfaces(drape_contact *c, const piece *p, const char 
         for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             const drape_configuration *from = &p->path.end[0], *to = &p->path.end[1];
-            if (stays_away(c, p, k, node, least) || drape_contact_lets_in(c, k, &node, 1))
+            /* Whether a node that moves straight in the coordinates of a collider surely keeps the least
+             * gap. */
+            bool away = !c->swing[k].turns;
+            for (int end = 0; away && end < 2; end++) {
+                const drape_configuration *at = &p->path.end[end];
+                double own[3];
+                drape_pose_own(&at->pose[k], at->x + 3 * (size_t)node, own);
+                away = drape_distant_keeps(&c->broad.distant, k, node, own, least);
+            }
+            if (away || drape_contact_lets_in(c, k, &node, 1))
                 continue;
             const double fraction =
                 drape_contact_march(c, k, &from->pose[k], &to->pose[k], &c->swing[k],

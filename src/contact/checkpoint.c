@@ -37,17 +37,6 @@ static bool are_finite(const drape_collider_pose *pose, int32_t count)
     return true;
 }
 
-static void archive_pose(drape_collider_pose *pose, drape_archive *a)
-{
-    drape_archive_doubles(a, pose->displacement, 3);
-    drape_archive_doubles(a, pose->velocity, 3);
-    drape_archive_doubles(a, pose->turn, 9);
-    drape_archive_doubles(a, pose->gradient, 9);
-    drape_archive_bool(a, &pose->turned);
-    drape_archive_bool(a, &pose->spins);
-    drape_archive_double(a, &pose->t);
-}
-
 static bool are_distances(const drape_contact *c)
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
@@ -103,8 +92,16 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_double(a, &c->start_t);
     drape_archive_doubles(a, c->start, points);
     drape_archive_doubles(a, c->start_v, points);
-    for (size_t i = 0; i < colliders; i++)
-        archive_pose(&c->start_pose[i], a);
+    for (size_t i = 0; i < colliders; i++) {
+        drape_collider_pose *pose = &c->start_pose[i];
+        drape_archive_doubles(a, pose->displacement, 3);
+        drape_archive_doubles(a, pose->velocity, 3);
+        drape_archive_doubles(a, pose->turn, 9);
+        drape_archive_doubles(a, pose->gradient, 9);
+        drape_archive_bool(a, &pose->turned);
+        drape_archive_bool(a, &pose->spins);
+        drape_archive_double(a, &pose->t);
+    }
     drape_inside_archive(&c->inside, a);
     archive_press(c, a);
     archive_couplings(c, a);

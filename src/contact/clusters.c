@@ -30,22 +30,17 @@ static int32_t cloth_of_face(const drape_model *m, int32_t face)
     return drape_model_cloth_of(m, m->triangle[3 * (size_t)face]);
 }
 
-static bool is_cluster(const builder *b, const drape_bvh_branch *branch)
-{
-    const int32_t *face = b->faces->order + branch->first;
-    bool same = branch->count <= DRAPE_CLUSTER_FACES;
-    for (int32_t i = 1; same && i < branch->count; i++)
-        same = cloth_of_face(b->model, face[i]) == cloth_of_face(b->model, face[0]);
-    return same;
-}
-
 /* The branches of a tree of faces down to clusters. */
 static void cut(builder *b, int32_t from)
 {
     drape_clusters *s = b->of;
     const drape_bvh_branch *branch = &b->faces->branches[from];
     const int32_t self = s->branch_count++;
-    if (is_cluster(b, branch)) {
+    const int32_t *face = b->faces->order + branch->first;
+    bool same = branch->count <= DRAPE_CLUSTER_FACES;
+    for (int32_t i = 1; same && i < branch->count; i++)
+        same = cloth_of_face(b->model, face[i]) == cloth_of_face(b->model, face[0]);
+    if (same) {
         for (int32_t i = 0; i < branch->count; i++)
             b->owner[DRAPE_ELEMENT_FACE][b->faces->order[branch->first + i]] = s->count;
         s->branches[self].cluster = s->count;
@@ -63,28 +58,6 @@ static void claim(builder *b, drape_element_kind kind, int32_t element, int32_t 
 {
     if (b->owner[kind][element] < 0)
         b->owner[kind][element] = cluster;
-}
-
-/* The first cluster with a face that has them owns a node or an edge; those without faces belong to the last
- * one. */
-static void find_owners(builder *b)
-{
-    const drape_model *m = b->model;
-    for (int32_t i = 0; i < m->triangle_count; i++) {
-        const int32_t face = b->faces->order[i], *n = m->triangle + 3 * (size_t)face,
-                      cluster = b->owner[DRAPE_ELEMENT_FACE][face];
-        for (int a = 0; a < 3; a++) {
-            const int32_t edge = drape_elements_of_edge(&b->edges, m->edge, n[a], n[(a + 1) % 3]);
-            claim(b, DRAPE_ELEMENT_NODE, n[a], cluster);
-            if (edge < 0)
-                continue;
-            b->of->faces_of_edge[edge]++;
-            claim(b, DRAPE_ELEMENT_EDGE, edge, cluster);
-        }
-    }
-    for (int kind = DRAPE_ELEMENT_NODE; kind <= DRAPE_ELEMENT_EDGE; kind++)
-        for (int32_t i = 0; i < count_of(m, kind); i++)
-            claim(b, (drape_element_kind)kind, i, b->of->count - 1);
 }
 
 /* ---- Lists ---- */
@@ -136,22 +109,6 @@ static int32_t list_points(builder *b, int32_t which, int32_t *points)
     return count;
 }
 
-static drape_status list_all_points(drape_arena *arena, builder *b)
-{
-    drape_clusters *s = b->of;
-    int32_t count = 0;
-    for (int32_t i = 0; i < s->count; i++) {
-        s->cluster[i].first_point = count;
-        s->cluster[i].points = list_points(b, i, NULL);
-        count += s->cluster[i].points;
-    }
-    s->point = drape_arena_take(arena, (size_t)count, sizeof *s->point);
-    memset(b->seen, 0, (size_t)b->model->node_count * sizeof *b->seen);
-    for (int32_t i = 0; s->point && i < s->count; i++)
-        list_points(b, i, s->point + s->cluster[i].first_point);
-    return s->point ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
 static drape_status build(drape_arena *arena, drape_arena *temporary, const double *rest, drape_clusters *s)
 {
     const drape_model *m = s->model;
@@ -175,10 +132,38 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
     s->branches = drape_arena_resize(arena, s->branches, (size_t)s->branch_count, sizeof *s->branches);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    find_owners(&b);
+    /* The first cluster with a face that has them owns a node or an edge; those without faces belong to
+     * the last one. */
+    for (int32_t i = 0; i < m->triangle_count; i++) {
+        const int32_t face = b.faces->order[i], *n = m->triangle + 3 * (size_t)face,
+                      cluster = b.owner[DRAPE_ELEMENT_FACE][face];
+        for (int a = 0; a < 3; a++) {
+            const int32_t edge = drape_elements_of_edge(&b.edges, m->edge, n[a], n[(a + 1) % 3]);
+            claim(&b, DRAPE_ELEMENT_NODE, n[a], cluster);
+            if (edge < 0)
+                continue;
+            b.of->faces_of_edge[edge]++;
+            claim(&b, DRAPE_ELEMENT_EDGE, edge, cluster);
+        }
+    }
+    for (int kind = DRAPE_ELEMENT_NODE; kind <= DRAPE_ELEMENT_EDGE; kind++)
+        for (int32_t i = 0; i < count_of(m, kind); i++)
+            claim(&b, (drape_element_kind)kind, i, b.of->count - 1);
     for (int kind = 0; !status && kind < DRAPE_ELEMENT_KINDS; kind++)
         status = list_elements(arena, &b, kind);
-    return status ? status : list_all_points(arena, &b);
+    if (status)
+        return status;
+    int32_t count = 0;
+    for (int32_t i = 0; i < s->count; i++) {
+        s->cluster[i].first_point = count;
+        s->cluster[i].points = list_points(&b, i, NULL);
+        count += s->cluster[i].points;
+    }
+    s->point = drape_arena_take(arena, (size_t)count, sizeof *s->point);
+    memset(b.seen, 0, (size_t)b.model->node_count * sizeof *b.seen);
+    for (int32_t i = 0; s->point && i < s->count; i++)
+        list_points(&b, i, s->point + s->cluster[i].first_point);
+    return s->point ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 drape_status drape_clusters_create(drape_arena *arena, const drape_model *model, const double *rest,

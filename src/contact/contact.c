@@ -37,34 +37,6 @@
 #define MAX_FACTOR 1e4
 #define GROWTH     0.5 /* activation distance of a moving collider, in its path in a nominal step */
 
-static drape_status take_arrays(drape_arena *arena, drape_contact *c)
-{
-    const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
-    double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v};
-    drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose, &c->kink_pose};
-    for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
-        *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
-    for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
-        *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
-    c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
-    c->distance_before = drape_arena_take(arena, colliders, sizeof *c->distance_before);
-    c->on_collider = drape_arena_take(arena, colliders, sizeof *c->on_collider);
-    size_t largest = 0;
-    for (size_t i = 0; i < colliders; i++)
-        if (c->model->colliders[i].frames.frame_count > 0 &&
-            (size_t)c->model->colliders[i].shape.point_count > largest)
-            largest = (size_t)c->model->colliders[i].shape.point_count;
-    c->own = drape_arena_take(arena, largest, 3 * sizeof *c->own);
-    c->own_end = drape_arena_take(arena, largest, 3 * sizeof *c->own_end);
-    c->on_point = drape_arena_take(arena, largest > 0 ? points - (size_t)c->model->node_count : 0,
-                                   3 * sizeof *c->on_point);
-    c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
-    c->before = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->before);
-    c->moved = drape_arena_take(arena, points + colliders, sizeof *c->moved);
-    c->carried = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->carried);
-    return drape_arena_status(arena);
-}
-
 /* Colliders that deform have bodies of their own. */
 static drape_status take_bodies(drape_arena *arena, drape_contact *c)
 {
@@ -106,8 +78,32 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->step_candidates);
     if (!status)
         status = drape_candidates_create(arena, &c->broad, MARGIN * c->mean_edge, &c->query_candidates);
-    if (!status)
-        status = take_arrays(arena, c);
+    if (!status) {
+        const size_t points = (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
+        double **const positions[] = {&c->x, &c->v, &c->from, &c->to, &c->start, &c->start_v};
+        drape_collider_pose **const poses[] = {&c->pose, &c->start_pose, &c->path_pose, &c->kink_pose};
+        for (size_t i = 0; i < sizeof positions / sizeof *positions; i++)
+            *positions[i] = drape_arena_take(arena, points, 3 * sizeof(double));
+        for (size_t i = 0; i < sizeof poses / sizeof *poses; i++)
+            *poses[i] = drape_arena_take(arena, colliders, sizeof **poses[i]);
+        c->start_least = drape_arena_take(arena, colliders, sizeof *c->start_least);
+        c->distance_before = drape_arena_take(arena, colliders, sizeof *c->distance_before);
+        c->on_collider = drape_arena_take(arena, colliders, sizeof *c->on_collider);
+        size_t largest = 0;
+        for (size_t i = 0; i < colliders; i++)
+            if (c->model->colliders[i].frames.frame_count > 0 &&
+                (size_t)c->model->colliders[i].shape.point_count > largest)
+                largest = (size_t)c->model->colliders[i].shape.point_count;
+        c->own = drape_arena_take(arena, largest, 3 * sizeof *c->own);
+        c->own_end = drape_arena_take(arena, largest, 3 * sizeof *c->own_end);
+        c->on_point = drape_arena_take(arena, largest > 0 ? points - (size_t)c->model->node_count : 0,
+                                       3 * sizeof *c->on_point);
+        c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
+        c->before = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->before);
+        c->moved = drape_arena_take(arena, points + colliders, sizeof *c->moved);
+        c->carried = drape_arena_take(arena, (size_t)c->model->node_count, sizeof *c->carried);
+        status = drape_arena_status(arena);
+    }
     if (!status)
         status = take_bodies(arena, c);
     if (!status)
@@ -254,19 +250,6 @@ void drape_contact_nearest_triangle(const drape_contact *c, int32_t collider, co
                   deformed->collider.shape.triangle[3 * (size_t)triangle + (size_t)k];
 }
 
-/* Returns whether a collider has moved. */
-static bool move_colliders(drape_contact *c, const drape_contact_at *at)
-{
-    bool moved = false;
-    for (int32_t i = 0; i < c->model->collider_count; i++) {
-        const drape_collider_pose before = c->pose[i];
-        pose_at(c, i, at, &c->pose[i]);
-        moved = moved || drape_pose_differs(&c->pose[i], &before) ||
-                (before.t != c->pose[i].t && drape_motion_deforms(c->motion, i));
-    }
-    return moved;
-}
-
 /* ---- Candidates and active set ---- */
 
 static bool are_valid(const drape_candidates *candidates, const drape_straight_path *path,
@@ -352,7 +335,13 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
 {
-    const bool moved = move_colliders(c, at);
+    bool moved = false;
+    for (int32_t i = 0; i < c->model->collider_count; i++) {
+        const drape_collider_pose before = c->pose[i];
+        pose_at(c, i, at, &c->pose[i]);
+        moved = moved || drape_pose_differs(&c->pose[i], &before) ||
+                (before.t != c->pose[i].t && drape_motion_deforms(c->motion, i));
+    }
     fill_velocities(c, at, c->v);
     if (drape_contact_take_failure(c)) {
         c->listed = false;
@@ -436,28 +425,21 @@ static drape_status update_inside(drape_contact *c)
     return added ? drape_contact_list(c, &now) : status;
 }
 
-/* *last: some gap would be at its least before the next raise. */
-static double smallest_gap(const drape_contact *c, bool *last)
+/* Makes contact stiffer where gaps shrink, and softer again. */
+static void adapt_stiffness(drape_contact *c, double t, bool retry)
 {
+    drape_press *press = &c->press;
     double least = 1;
-    *last = false;
+    bool last = false; /* some gap would be at its least before the next raise */
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         if (contact->gentle || contact->exempt > 0)
             continue;
         least = fmin(least, contact->gap.value / contact->pair.distance);
-        *last = *last || contact->gap.value < RAISE * drape_pair_least_gap(&contact->pair, c->broad.rounding);
+        last = last || contact->gap.value < RAISE * drape_pair_least_gap(&contact->pair, c->broad.rounding);
     }
-    *last = drape_ranks_any(c->ranks, *last);
-    return drape_ranks_least(c->ranks, least);
-}
-
-/* Makes contact stiffer where gaps shrink, and softer again. */
-static void adapt_stiffness(drape_contact *c, double t, bool retry)
-{
-    drape_press *press = &c->press;
-    bool last;
-    const double gap = smallest_gap(c, &last), before = press->factor;
+    last = drape_ranks_any(c->ranks, last);
+    const double gap = drape_ranks_least(c->ranks, least), before = press->factor;
     if (retry && !last)
         return;
     press->widest = fmax(press->widest, gap);
@@ -625,13 +607,6 @@ static drape_status adapt_distances(drape_contact *c, double t, bool retry)
     return status;
 }
 
-/* A step that is tried again begins where it did. */
-static bool is_retry(const drape_contact *c)
-{
-    const bool same = c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
-    return drape_ranks_all(c->ranks, same);
-}
-
 bool drape_contact_has_begun(const drape_contact *c, const double *x, double t)
 {
     bool same =
@@ -693,7 +668,9 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     c->refused = false;
     drape_contact_set_rounding(c, c->x);
     drape_distant_update(&c->broad.distant, c->x, c->pose, c->broad.rounding);
-    const bool retry = is_retry(c);
+    /* A step that is tried again begins where it did. */
+    const bool same = c->begun && memcmp(c->start, c->x, 3 * (size_t)c->broad.points * sizeof *c->x) == 0;
+    const bool retry = drape_ranks_all(c->ranks, same);
     if (!status)
         status = agree(c, adapt_distances(c, t, retry));
     if (!status)

@@ -29,10 +29,20 @@ static bool same_points(const drape_contact *to, int32_t now, const drape_contac
     return to->model->colliders[now].shape.point_count == from->model->colliders[before].shape.point_count;
 }
 
-/* Pairs that are left out, as those of a collider with another shape, count as new ones when the next step
- * begins. */
-static drape_status copy_inside(drape_contact *to, const drape_contact *from, const int32_t *before)
+drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
 {
+    to->press = from->press;
+    to->press.work = 0;
+    to->seconds = from->seconds;
+    to->search_seconds = from->search_seconds;
+    to->longest_path = from->longest_path;
+    for (int32_t c = 0; c < to->model->collider_count; c++)
+        if (before[c] >= 0 && !to->model->contact.distance_given &&
+            !(to->model->colliders[c].shape.distance > 0))
+            to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
+    to->broad.rounding = from->broad.rounding;
+    /* Pairs that are left out, as those of a collider with another shape, count as new ones when the next
+     * step begins. */
     drape_status status = DRAPE_OK;
     for (int32_t i = 0; !status && i < from->inside.count; i++) {
         drape_pair_key key = from->inside.keys[i];
@@ -49,19 +59,4 @@ static drape_status copy_inside(drape_contact *to, const drape_contact *from, co
     }
     drape_inside_sort(&to->inside);
     return status;
-}
-
-drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
-{
-    to->press = from->press;
-    to->press.work = 0;
-    to->seconds = from->seconds;
-    to->search_seconds = from->search_seconds;
-    to->longest_path = from->longest_path;
-    for (int32_t c = 0; c < to->model->collider_count; c++)
-        if (before[c] >= 0 && !to->model->contact.distance_given &&
-            !(to->model->colliders[c].shape.distance > 0))
-            to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
-    to->broad.rounding = from->broad.rounding;
-    return copy_inside(to, from, before);
 }

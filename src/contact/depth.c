@@ -59,22 +59,6 @@ static double depth_across(const drape_collider *collider, const drape_collider_
     return drape_depth_edge(collider, pose, end[0], end[1], INFINITY);
 }
 
-/* False if a tangent plane at some corner is above `enough` on the whole triangle. */
-static bool may_be_deep(const drape_collider *collider, const drape_collider_pose *pose,
-                        const double *const corner[3], double enough)
-{
-    for (int i = 0; i < 3; i++) {
-        double n[3], to[3], d = drape_collider_distance(collider, pose, corner[i], n, NULL), least = d;
-        for (int j = 0; j < 3; j++) {
-            vec3_sub(corner[j], corner[i], to);
-            least = fmin(least, d + vec3_dot(n, to));
-        }
-        if (least > enough)
-            return false;
-    }
-    return true;
-}
-
 /* The minimum on a line parallel to side 1 2 is a convex function of s, minimised by golden section (Kiefer
  * 1953), until values beside a minimum differ by rounding alone: at the root of epsilon. */
 double drape_depth_face(const drape_collider *collider, const drape_collider_pose *pose,
@@ -82,8 +66,17 @@ double drape_depth_face(const drape_collider *collider, const drape_collider_pos
 {
     const double golden = (sqrt(5) - 1) / 2;
     double low = 0, high = 1, d[2], sides[3], length = 0;
-    if (!may_be_deep(collider, pose, corner, enough))
-        return INFINITY;
+    /* None if a tangent plane at some corner is above `enough` on the whole triangle. */
+    for (int i = 0; i < 3; i++) {
+        double n[3], to[3], distance = drape_collider_distance(collider, pose, corner[i], n, NULL),
+                            least = distance;
+        for (int j = 0; j < 3; j++) {
+            vec3_sub(corner[j], corner[i], to);
+            least = fmin(least, distance + vec3_dot(n, to));
+        }
+        if (least > enough)
+            return INFINITY;
+    }
     for (int i = 1; i < 3; i++) {
         vec3_sub(corner[i], corner[0], sides);
         length = fmax(length, vec3_norm(sides)); /* bounds the change of the distance with s */

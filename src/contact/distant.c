@@ -11,11 +11,6 @@
 #define STALE   0.25                /* of its gap: a node that has moved by more is looked at again */
 #define CLUSTER DRAPE_CLUSTER_FACES /* nodes of one */
 
-static int32_t cluster_count(const drape_model *model)
-{
-    return (model->node_count + CLUSTER - 1) / CLUSTER;
-}
-
 /* Nodes in the order in which faces have them first, then those that no face has. */
 static void order_nodes(const drape_path_bvh *faces, drape_distant *d, bool *listed)
 {
@@ -37,11 +32,12 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
                                   drape_distant *out)
 {
     const size_t nodes = (size_t)model->node_count, count = (size_t)model->collider_count * nodes;
-    *out =
-        (drape_distant){.model = model,
-                        .seen = drape_arena_take(arena, count, sizeof *out->seen),
-                        .order = drape_arena_take(arena, nodes, sizeof *out->order),
-                        .balls = drape_arena_take(arena, (size_t)cluster_count(model), sizeof *out->balls)};
+    *out = (drape_distant){.model = model,
+                           .seen = drape_arena_take(arena, count, sizeof *out->seen),
+                           .order = drape_arena_take(arena, nodes, sizeof *out->order),
+                           .balls =
+                               drape_arena_take(arena, (size_t)((model->node_count + CLUSTER - 1) / CLUSTER),
+                                                sizeof *out->balls)};
     bool *listed = drape_arena_take(arena, nodes, sizeof *listed);
     if (drape_arena_status(arena))
         return drape_arena_status(arena);

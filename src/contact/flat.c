@@ -181,16 +181,6 @@ static void set_group(builder *b, int32_t which, int32_t group)
     }
 }
 
-static void set_faces(builder *b)
-{
-    for (int32_t i = 0; i < b->clusters->count; i++) {
-        const drape_cluster *cluster = &b->clusters->cluster[i];
-        b->out->height[i] = INFINITY;
-        for (int32_t g = 0; b->flat[cluster->cloth] && g < cluster->groups[DRAPE_ELEMENT_FACE]; g++)
-            set_group(b, i, cluster->first_group[DRAPE_ELEMENT_FACE] + g);
-    }
-}
-
 /* ---- Branches at rest ---- */
 
 static const drape_flat_area nothing = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
@@ -224,21 +214,6 @@ static void set_leaf(builder *b, int32_t branch)
     b->out->area[branch] = area;
     b->out->cloth[branch] = flat ? cluster->cloth : -1;
     b->out->leaves[branch] = 1;
-}
-
-static void set_branches(builder *b)
-{
-    drape_flat *s = b->out;
-    for (int32_t i = b->clusters->branch_count - 1; i >= 0; i--) {
-        const int32_t first = i + 1, second = b->clusters->branches[i].second;
-        if (second == 0) {
-            set_leaf(b, i);
-            continue;
-        }
-        s->area[i] = cover(&s->area[first], &s->area[second]);
-        s->cloth[i] = s->cloth[first] == s->cloth[second] ? s->cloth[first] : -1;
-        s->leaves[i] = s->leaves[first] + s->leaves[second];
-    }
 }
 
 /* ---- Pairs of branches ---- */
@@ -335,8 +310,23 @@ drape_status drape_flat_create(drape_arena *arena, const drape_clusters *cluster
     for (int32_t i = 0; complete && i < m->cloth_count; i++)
         lay_flat(&b, i, rest, &beside);
     if (complete) {
-        set_faces(&b);
-        set_branches(&b);
+        for (int32_t i = 0; i < b.clusters->count; i++) {
+            const drape_cluster *cluster = &b.clusters->cluster[i];
+            b.out->height[i] = INFINITY;
+            for (int32_t g = 0; b.flat[cluster->cloth] && g < cluster->groups[DRAPE_ELEMENT_FACE]; g++)
+                set_group(&b, i, cluster->first_group[DRAPE_ELEMENT_FACE] + g);
+        }
+        drape_flat *s = b.out;
+        for (int32_t i = b.clusters->branch_count - 1; i >= 0; i--) {
+            const int32_t first = i + 1, second = b.clusters->branches[i].second;
+            if (second == 0) {
+                set_leaf(&b, i);
+                continue;
+            }
+            s->area[i] = cover(&s->area[first], &s->area[second]);
+            s->cloth[i] = s->cloth[first] == s->cloth[second] ? s->cloth[first] : -1;
+            s->leaves[i] = s->leaves[first] + s->leaves[second];
+        }
         list_pairs(arena, &b);
     }
     const drape_status status = drape_arena_status(&temporary);
@@ -379,23 +369,6 @@ LANES_DISPATCH static void fit_cluster(drape_flat *s, int32_t which, const doubl
                 sum[column][k][0] + sum[column][k][1] + sum[column][k][2] + sum[column][k][3];
 }
 
-/* Orthonormal columns near those of a sum of gradients. False: there are none. */
-static bool find_frame(double sum[2][3], double frame[2][3])
-{
-    double plus[3], minus[3];
-    const double first = vec3_norm(sum[0]), second = vec3_norm(sum[1]);
-    for (int k = 0; k < 3; k++) {
-        plus[k] = sum[0][k] / first + sum[1][k] / second;
-        minus[k] = sum[0][k] / first - sum[1][k] / second;
-    }
-    const double p = sqrt(2) * vec3_norm(plus), m = sqrt(2) * vec3_norm(minus);
-    for (int k = 0; k < 3; k++) {
-        frame[0][k] = plus[k] / p + minus[k] / m;
-        frame[1][k] = plus[k] / p - minus[k] / m;
-    }
-    return first > 0 && second > 0 && p > 0 && m > 0;
-}
-
 /* Whether the symmetric part of A^T F has no eigenvalue below c on some groups of faces. */
 LANES_DISPATCH static bool is_stretched(const drape_gradients *gradients, int32_t groups, double frame[2][3],
                                         double c)
@@ -428,15 +401,6 @@ static int32_t find_pair(const drape_flat *s, int32_t a, int32_t b)
     return -1;
 }
 
-/* c for pieces that are at least `height` apart at rest. Half of their distance, if that is what they must
- * keep, grows by half of what is beyond. */
-static double wanted_share(const drape_flat_query *want, double height)
-{
-    const double half = 0.5 * height + want->slack;
-    const double share = (fmin(want->reach, half) + want->rounding) / height;
-    return half < want->reach ? fmax(share, 0.5) : share;
-}
-
 bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_flat_query *want)
 {
     const int32_t pair = find_pair(s, a, b);
@@ -453,8 +417,24 @@ bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_fla
         for (int column = 0; column < 2; column++)
             vec3_add_scaled(1, s->sum[which][column], sum[column]);
     }
-    const double share = wanted_share(want, height);
-    bool apart = find_frame(sum, frame);
+    /* c for pieces that are at least `height` apart at rest. Half of their distance, if that is what they
+     * must keep, grows by half of what is beyond. */
+    const double half = 0.5 * height + want->slack;
+    const double wanted = (fmin(want->reach, half) + want->rounding) / height;
+    const double share = half < want->reach ? fmax(wanted, 0.5) : wanted;
+    /* Orthonormal columns near those of a sum of gradients. */
+    double plus[3], minus[3];
+    const double first = vec3_norm(sum[0]), second = vec3_norm(sum[1]);
+    for (int k = 0; k < 3; k++) {
+        plus[k] = sum[0][k] / first + sum[1][k] / second;
+        minus[k] = sum[0][k] / first - sum[1][k] / second;
+    }
+    const double p = sqrt(2) * vec3_norm(plus), m = sqrt(2) * vec3_norm(minus);
+    for (int k = 0; k < 3; k++) {
+        frame[0][k] = plus[k] / p + minus[k] / m;
+        frame[1][k] = plus[k] / p - minus[k] / m;
+    }
+    bool apart = first > 0 && second > 0 && p > 0 && m > 0;
     for (int32_t i = 0; apart && i < count; i++) {
         const drape_cluster *cluster = &s->clusters->cluster[window[i]];
         apart = is_stretched(s->gradients + cluster->first_group[DRAPE_ELEMENT_FACE],

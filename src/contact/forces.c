@@ -9,24 +9,6 @@
 
 #define OUT_SPEED 0.2 /* of the size of the scene in a second: at most so fast is cloth pushed out */
 
-/* Exempt pairs: a bounded pressure, and no rebound. What pushes cloth out in addition to that does not rub:
- * with friction in proportion it would hold fast what it pushes. */
-static drape_contact_law exempt_law(const drape_contact *c, const drape_active_contact *contact)
-{
-    const drape_contact_def *def = &c->model->contact;
-    const drape_pair *pair = &contact->pair;
-    const double friction =
-        pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
-    return (drape_contact_law){.distance = pair->distance,
-                               .low = DRAPE_BARRIER_BOUNDED,
-                               .stiffness = contact->exempt * def->relaxed_pressure * pair->area,
-                               .friction = friction / contact->exempt,
-                               .velocity = def->friction_velocity,
-                               .damping = 1,
-                               .restitution_velocity =
-                                   fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};
-}
-
 /* The energy of a gap that closes is proportional to K d (force.h). K is proportional to 1/d, so that pairs
  * of equal area absorb the same energy, whatever their activation distance. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_active_contact *contact)
@@ -34,8 +16,20 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
     const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
-    if (contact->exempt > 0)
-        return exempt_law(c, contact);
+    if (contact->exempt > 0) {
+        /* Exempt pairs: a bounded pressure, and no rebound. What pushes cloth out in addition to that does
+         * not rub: with friction in proportion it would hold fast what it pushes. */
+        const double friction =
+            pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
+        return (drape_contact_law){.distance = pair->distance,
+                                   .low = DRAPE_BARRIER_BOUNDED,
+                                   .stiffness = contact->exempt * def->relaxed_pressure * pair->area,
+                                   .friction = friction / contact->exempt,
+                                   .velocity = def->friction_velocity,
+                                   .damping = 1,
+                                   .restitution_velocity =
+                                       fmax(def->restitution_velocity, OUT_SPEED * c->model->length)};
+    }
     const double e = collider ? collider->restitution : def->self_restitution,
                  least = drape_pair_least_gap(pair, c->broad.rounding) / pair->distance;
     return (drape_contact_law){
@@ -70,16 +64,6 @@ double drape_contact_arm(const drape_contact *c, const drape_active_contact *con
     return cloth_first ? contact->pair.radius : -contact->pair.radius;
 }
 
-/* The surface of a round feature moves otherwise than its core. */
-static void add_rolling(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
-{
-    const drape_collider_pose *pose = &c->pose[contact->pair.collider];
-    const double arm = drape_contact_arm(c, contact);
-    for (int a = 0; a < contact->gap.closest.points; a++)
-        for (int k = 0; k < 3 && contact->pair.node[a] >= c->model->node_count; k++)
-            v[a][k] += arm * vec3_dot(pose->gradient + 3 * k, contact->gap.closest.normal);
-}
-
 /* Whether the contact is with the distance of a collider that deforms, as that of exempt cloth. */
 static bool is_on_body(const drape_contact *c, const drape_active_contact *contact)
 {
@@ -96,17 +80,6 @@ static void find_body_points(const drape_contact *c, const drape_active_contact 
     drape_contact_fit_bodies(c, c->pose);
     drape_contact_nearest_triangle(c, contact->pair.collider, &c->pose[contact->pair.collider], x, node,
                                    weight);
-}
-
-static void subtract_body_velocity(const drape_contact *c, const drape_active_contact *contact,
-                                   double v[4][3])
-{
-    int32_t node[3];
-    double weight[3];
-    find_body_points(c, contact, node, weight);
-    for (int a = 0; a < contact->gap.closest.points; a++)
-        for (int k = 0; k < 3; k++)
-            vec3_add_scaled(-weight[k], c->v + 3 * (size_t)node[k], v[a]);
 }
 
 /* The forces on the points of a collider that deforms. */
@@ -132,11 +105,22 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
     for (int a = 0; a < contact->gap.closest.points; a++)
         memcpy(v[a], c->v + 3 * (size_t)contact->pair.node[a], sizeof v[a]);
     if (is_on_body(c, contact)) {
-        subtract_body_velocity(c, contact, v);
+        int32_t node[3];
+        double weight[3];
+        find_body_points(c, contact, node, weight);
+        for (int a = 0; a < contact->gap.closest.points; a++)
+            for (int k = 0; k < 3; k++)
+                vec3_add_scaled(-weight[k], c->v + 3 * (size_t)node[k], v[a]);
         return;
     }
-    if (drape_contact_rolls(c, contact))
-        add_rolling(c, contact, v);
+    if (drape_contact_rolls(c, contact)) {
+        /* The surface of a round feature moves otherwise than its core. */
+        const drape_collider_pose *pose = &c->pose[contact->pair.collider];
+        const double arm = drape_contact_arm(c, contact);
+        for (int a = 0; a < contact->gap.closest.points; a++)
+            for (int k = 0; k < 3 && contact->pair.node[a] >= c->model->node_count; k++)
+                v[a][k] += arm * vec3_dot(pose->gradient + 3 * k, contact->gap.closest.normal);
+    }
     for (int a = 0; contact->pair.kind == DRAPE_PAIR_SURFACE && a < contact->gap.closest.points; a++) {
         double surface[3];
         drape_pose_velocity(&c->pose[contact->pair.collider], c->x + 3 * (size_t)contact->pair.node[a],
@@ -181,14 +165,6 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
         add_on_points(c, contact, from);
 }
 
-static void add_elastic(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
-                        double *g)
-{
-    double local[12];
-    drape_contact_gradient(&contact->gap, law, local);
-    scatter(c, contact, local, g);
-}
-
 static void add_friction(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
                          double force, double v[4][3], double *g)
 {
@@ -229,8 +205,11 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, contact);
-        if (conservative)
-            add_elastic(c, contact, &law, g);
+        if (conservative) {
+            double local[12];
+            drape_contact_gradient(&contact->gap, &law, local);
+            scatter(c, contact, local, g);
+        }
         if (dissipative)
             add_dissipative(c, contact, &law, g);
     }

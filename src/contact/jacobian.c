@@ -183,38 +183,6 @@ static void differentiate_by_v(const drape_contact *c, const drape_active_contac
     add_dissipative(c, &(request){1, DRAPE_CONTACT_VELOCITY}, contact, &law, NULL, 0, h);
 }
 
-/* The derivatives of one active contact, h (12 x 12). */
-static void differentiate(const drape_contact *c, const request *want, const drape_active_contact *contact,
-                          double *h)
-{
-    const drape_contact_law law = drape_contact_law_of(c, contact);
-    const drape_configuration now = drape_contact_configuration(c);
-    const bool by_x = want->which == DRAPE_CONTACT_EXACT || want->which == DRAPE_CONTACT_SYMMETRIC;
-    drape_gap_derivatives derivatives;
-    if (by_x) {
-        drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
-        drape_contact_hessian(&contact->gap, &derivatives, &law, h);
-    } else if (want->which == DRAPE_CONTACT_VELOCITY) {
-        memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
-    } else {
-        drape_contact_gauss_newton(&contact->gap, &law, h);
-    }
-    const double excess =
-        want->which == DRAPE_CONTACT_VELOCITY ? 0 : excess_stiffness(c, contact, &law, want->weight, !by_x);
-    add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, excess, h);
-    const double *ce = contact->gap.closest.c, *n = contact->gap.closest.normal;
-    for (int i = 0; excess != 0 && i < 3 * contact->gap.closest.points; i++)
-        for (int j = 0; j < 3 * contact->gap.closest.points; j++)
-            h[D * i + j] += excess * ce[i / 3] * n[i % 3] * ce[j / 3] * n[j % 3];
-    if (by_x && spins(c, contact)) {
-        double hv[D * D];
-        differentiate_by_v(c, contact, hv);
-        add_spin(c, contact, &derivatives, hv, h);
-    }
-    if (want->which == DRAPE_CONTACT_SYMMETRIC)
-        symmetrize(contact->gap.closest.points, h);
-}
-
 bool drape_contact_has_friction(const drape_contact *c)
 {
     bool friction = c->model->contact.self && c->model->contact.self_friction > 0;
@@ -234,7 +202,35 @@ static void add_derivatives(const drape_contact *c, const request *want, double 
 {
     double h[D * D];
     for (int32_t i = 0; i < c->active.count; i++) {
-        differentiate(c, want, &c->active.contacts[i], h);
+        /* The derivatives of one active contact, h (12 x 12). */
+        const drape_active_contact *contact = &c->active.contacts[i];
+        const drape_contact_law law = drape_contact_law_of(c, contact);
+        const drape_configuration now = drape_contact_configuration(c);
+        const bool by_x = want->which == DRAPE_CONTACT_EXACT || want->which == DRAPE_CONTACT_SYMMETRIC;
+        drape_gap_derivatives derivatives;
+        if (by_x) {
+            drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
+            drape_contact_hessian(&contact->gap, &derivatives, &law, h);
+        } else if (want->which == DRAPE_CONTACT_VELOCITY) {
+            memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
+        } else {
+            drape_contact_gauss_newton(&contact->gap, &law, h);
+        }
+        const double excess = want->which == DRAPE_CONTACT_VELOCITY
+                                  ? 0
+                                  : excess_stiffness(c, contact, &law, want->weight, !by_x);
+        add_dissipative(c, want, contact, &law, by_x ? &derivatives : NULL, excess, h);
+        const double *ce = contact->gap.closest.c, *n = contact->gap.closest.normal;
+        for (int k = 0; excess != 0 && k < 3 * contact->gap.closest.points; k++)
+            for (int j = 0; j < 3 * contact->gap.closest.points; j++)
+                h[D * k + j] += excess * ce[k / 3] * n[k % 3] * ce[j / 3] * n[j % 3];
+        if (by_x && spins(c, contact)) {
+            double hv[D * D];
+            differentiate_by_v(c, contact, hv);
+            add_spin(c, contact, &derivatives, hv, h);
+        }
+        if (want->which == DRAPE_CONTACT_SYMMETRIC)
+            symmetrize(contact->gap.closest.points, h);
         add_blocks(c, &c->active.contacts[i], share, h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {

@@ -149,23 +149,19 @@ double drape_pair_activation_distance(const drape_pair *pair, const drape_config
     return fmin(pair->distance, fmax(0.5 * drape_pair_gap_value(pair, rest), least_activation(pair, rest)));
 }
 
-static bool surface_gap(const drape_pair *pair, const drape_configuration *at, drape_gap *gap)
-{
-    gap->closest = (drape_closest){.points = 1, .c = {1}};
-    gap->value = surface(pair, at, NULL, NULL);
-    if (!(gap->value < pair->distance))
-        return false;
-    surface(pair, at, gap->closest.normal, gap->curvature);
-    return true;
-}
-
 bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const double *rest, drape_gap *gap)
 {
     double x[4][3];
     gap->fixed_normal = gap->mollified = false;
     gap->m = 1;
-    if (!finders[pair->kind])
-        return surface_gap(pair, at, gap);
+    if (!finders[pair->kind]) {
+        gap->closest = (drape_closest){.points = 1, .c = {1}};
+        gap->value = surface(pair, at, NULL, NULL);
+        if (!(gap->value < pair->distance))
+            return false;
+        surface(pair, at, gap->closest.normal, gap->curvature);
+        return true;
+    }
     gather(pair, 4, at->x, x);
     gap->value = INFINITY;
     if (are_apart(pair->kind, x, pair->distance + pair->radius))

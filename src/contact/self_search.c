@@ -44,26 +44,6 @@ static bool has_marked(const drape_clusters *c, const drape_cluster *cluster, co
     return any;
 }
 
-static void fit_branches(drape_self_search *s, const drape_self_query *want)
-{
-    const drape_clusters *c = &s->clusters;
-    const double *const ends[2] = {want->x, want->y};
-    for (int32_t i = c->branch_count - 1; i >= 0; i--) {
-        const int32_t a = i + 1, b = c->branches[i].second;
-        const drape_cluster *cluster = &c->cluster[c->branches[i].cluster];
-        s->marked[i] = b > 0 ? s->marked[a] || s->marked[b] : has_marked(c, cluster, want->marked);
-        for (int end = 0; end < 2 && ends[end]; end++) {
-            double *low = s->low[i][end], *high = s->high[i][end];
-            if (b == 0)
-                fit_leaf(c, cluster, ends[end], low, high);
-            for (int k = 0; b > 0 && k < 3; k++) {
-                low[k] = s->low[a][end][k] < s->low[b][end][k] ? s->low[a][end][k] : s->low[b][end][k];
-                high[k] = s->high[a][end][k] > s->high[b][end][k] ? s->high[a][end][k] : s->high[b][end][k];
-            }
-        }
-    }
-}
-
 /* A box that is apart from every other one. */
 static void set_nowhere(drape_path_boxes *boxes, int lane, int end)
 {
@@ -204,18 +184,6 @@ static void meet_kinds(const traversal *t, int32_t a, drape_element_kind first, 
         meet_at(&of_a, &of_b, same, t->want->reach, visit, t->user);
 }
 
-/* Two leaves. */
-static void meet_clusters(const traversal *t, int32_t a, int32_t b)
-{
-    const drape_cluster_branch *branches = t->search->clusters.branches;
-    fit_elements(t->search, branches[a].cluster, t->want);
-    fit_elements(t->search, branches[b].cluster, t->want);
-    meet_kinds(t, a, DRAPE_ELEMENT_NODE, b, DRAPE_ELEMENT_FACE, t->face);
-    if (a != b)
-        meet_kinds(t, b, DRAPE_ELEMENT_NODE, a, DRAPE_ELEMENT_FACE, t->face);
-    meet_kinds(t, a, DRAPE_ELEMENT_EDGE, b, DRAPE_ELEMENT_EDGE, t->edge);
-}
-
 static bool are_apart(const traversal *t, int32_t a, int32_t b)
 {
     const drape_self_search *s = t->search;
@@ -239,8 +207,16 @@ static void meet(const traversal *t, int32_t a, int32_t b)
         drape_flat_keeps_apart(&t->search->flat, a, b, &t->flat))
         return;
     const int count = drape_clusters_descend(&t->search->clusters, a, b, next);
-    if (count == 0)
-        meet_clusters(t, a, b);
+    if (count == 0) {
+        /* Two leaves. */
+        const drape_cluster_branch *branches = t->search->clusters.branches;
+        fit_elements(t->search, branches[a].cluster, t->want);
+        fit_elements(t->search, branches[b].cluster, t->want);
+        meet_kinds(t, a, DRAPE_ELEMENT_NODE, b, DRAPE_ELEMENT_FACE, t->face);
+        if (a != b)
+            meet_kinds(t, b, DRAPE_ELEMENT_NODE, a, DRAPE_ELEMENT_FACE, t->face);
+        meet_kinds(t, a, DRAPE_ELEMENT_EDGE, b, DRAPE_ELEMENT_EDGE, t->edge);
+    }
     for (int i = 0; i < count; i++)
         meet(t, next[i][0], next[i][1]);
 }
@@ -262,6 +238,21 @@ void drape_self_search_pairs(drape_self_search *s, const drape_self_query *want,
                          .face = face,
                          .edge = edge,
                          .user = user};
-    fit_branches(s, want);
+    const drape_clusters *c = &s->clusters;
+    const double *const ends[2] = {want->x, want->y};
+    for (int32_t i = c->branch_count - 1; i >= 0; i--) {
+        const int32_t a = i + 1, b = c->branches[i].second;
+        const drape_cluster *cluster = &c->cluster[c->branches[i].cluster];
+        s->marked[i] = b > 0 ? s->marked[a] || s->marked[b] : has_marked(c, cluster, want->marked);
+        for (int end = 0; end < 2 && ends[end]; end++) {
+            double *low = s->low[i][end], *high = s->high[i][end];
+            if (b == 0)
+                fit_leaf(c, cluster, ends[end], low, high);
+            for (int k = 0; b > 0 && k < 3; k++) {
+                low[k] = s->low[a][end][k] < s->low[b][end][k] ? s->low[a][end][k] : s->low[b][end][k];
+                high[k] = s->high[a][end][k] > s->high[b][end][k] ? s->high[a][end][k] : s->high[b][end][k];
+            }
+        }
+    }
     meet(&t, 0, 0);
 }

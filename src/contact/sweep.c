@@ -165,19 +165,6 @@ void drape_contact_sweep(drape_contact *c, double t, double *y)
 
 /* ---- Layers ---- */
 
-/* Marks the nodes that are not where the step began. Returns whether there are any. */
-static bool mark_moved(const drape_contact *c, const double *y, bool *marked)
-{
-    bool any = false;
-    memset(marked, 0, (size_t)(c->broad.points + c->model->collider_count) * sizeof *marked);
-    for (int32_t i = 0; i < c->model->free_count; i++) {
-        const size_t node = (size_t)c->model->node_of_free[i];
-        marked[node] = memcmp(y + 3 * node, c->start + 3 * node, 3 * sizeof *y) != 0;
-        any = any || marked[node];
-    }
-    return any;
-}
-
 typedef struct layers {
     drape_contact *contact;
     bool meet;  /* pieces of cloth pass through each other, */
@@ -205,7 +192,16 @@ static bool layers_meet(drape_contact *c, const double *y, bool *grown)
 {
     layers of = {.contact = c};
     *grown = false;
-    if (!mark_moved(c, y, c->moved))
+    /* Marks the nodes that are not where the step began. */
+    bool *marked = c->moved;
+    bool any = false;
+    memset(marked, 0, (size_t)(c->broad.points + c->model->collider_count) * sizeof *marked);
+    for (int32_t i = 0; i < c->model->free_count; i++) {
+        const size_t node = (size_t)c->model->node_of_free[i];
+        marked[node] = memcmp(y + 3 * node, c->start + 3 * node, 3 * sizeof *y) != 0;
+        any = any || marked[node];
+    }
+    if (!any)
         return false;
     drape_contact_fill(c, y, c->path_pose, c->to);
     const drape_straight_path path = {{{.model = c->model, .x = c->start, .pose = c->start_pose},
@@ -232,20 +228,6 @@ static int32_t find_carrier(const drape_contact *c, int32_t node)
     return carrier;
 }
 
-/* Cloth that moves rigidly with a collider meets neither that nor other cloth which does. */
-static void carry(drape_contact *c, double *y)
-{
-    for (int32_t i = 0; i < c->model->free_count; i++) {
-        const int32_t node = c->model->node_of_free[i];
-        const int32_t carrier = c->carried[node] ? find_carrier(c, node) : -1;
-        double own[3];
-        if (carrier < 0)
-            continue;
-        drape_pose_own(&c->start_pose[carrier], c->start + 3 * (size_t)node, own);
-        drape_pose_point(&c->path_pose[carrier], own, y + 3 * (size_t)node);
-    }
-}
-
 void drape_contact_carry_layers(drape_contact *c, double t, double *y)
 {
     const double start = drape_clock_seconds();
@@ -255,7 +237,16 @@ void drape_contact_carry_layers(drape_contact *c, double t, double *y)
     memset(c->carried, 0, (size_t)c->model->node_count * sizeof *c->carried);
     bool grown, apart = !layers_meet(c, y, &grown);
     while (!apart && grown) {
-        carry(c, y);
+        /* Cloth that moves rigidly with a collider meets neither that nor other cloth which does. */
+        for (int32_t i = 0; i < c->model->free_count; i++) {
+            const int32_t node = c->model->node_of_free[i];
+            const int32_t carrier = c->carried[node] ? find_carrier(c, node) : -1;
+            double own[3];
+            if (carrier < 0)
+                continue;
+            drape_pose_own(&c->start_pose[carrier], c->start + 3 * (size_t)node, own);
+            drape_pose_point(&c->path_pose[carrier], own, y + 3 * (size_t)node);
+        }
         sweep_all(c, y);
         apart = !layers_meet(c, y, &grown);
     }

@@ -22,22 +22,18 @@ static double aim_of(const drape_pair *pair, double gap)
     return fmin(gap, DRAPE_RESTING * pair->distance);
 }
 
-static drape_pair pair_of(const drape_broad_phase *broad, int32_t node, int32_t triangle)
-{
-    const int32_t *t = broad->triangle + 3 * (size_t)triangle, collider = broad->triangle_collider[triangle];
-    return (drape_pair){.kind = DRAPE_PAIR_TRIANGLE,
-                        .node = {node, t[0], t[1], t[2]},
-                        .collider = collider,
-                        .radius = broad->model->colliders[collider].shape.radius,
-                        .distance = broad->distance[collider]};
-}
-
 /* Of triangles that are near from the beginning on, the nearest counts. */
 static void meet(void *user, int32_t triangle)
 {
     meeting *m = user;
     const drape_contact *c = m->contact;
-    const drape_pair pair = pair_of(&c->broad, m->node, triangle);
+    const drape_broad_phase *broad = &c->broad;
+    const int32_t *t = broad->triangle + 3 * (size_t)triangle, collider = broad->triangle_collider[triangle];
+    const drape_pair pair = {.kind = DRAPE_PAIR_TRIANGLE,
+                             .node = {m->node, t[0], t[1], t[2]},
+                             .collider = collider,
+                             .radius = broad->model->colliders[collider].shape.radius,
+                             .distance = broad->distance[collider]};
     if (c->model->colliders[pair.collider].frames.frame_count == 0 ||
         drape_exempt_has(c->exempt, pair.collider, &m->node, 1))
         return;

@@ -22,67 +22,6 @@
 
 /* ---- Topology ---- */
 
-static drape_status take_sheets(drape_untangler *u)
-{
-    const drape_model *m = u->model;
-    drape_sheets *s = &u->sheets;
-    const size_t points = (size_t)u->broad.points;
-    size_t edges = (size_t)m->edge_count, triangles = (size_t)m->triangle_count;
-    for (int32_t c = 0; c < m->collider_count; c++)
-        if (u->open[c]) {
-            edges += (size_t)m->colliders[c].shape.segment_count;
-            triangles += (size_t)m->colliders[c].shape.triangle_count;
-        }
-    s->edge = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge);
-    s->triangle = drape_arena_take(u->arena, triangles, 3 * sizeof *s->triangle);
-    s->edge_triangle = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge_triangle);
-    s->of_point = drape_arena_take(u->arena, points, sizeof *s->of_point);
-    u->block = drape_arena_take(u->arena, edges, sizeof *u->block);
-    u->hinge = drape_arena_take(u->arena, edges, 2 * sizeof *u->hinge);
-    u->hinge_length = drape_arena_take(u->arena, edges, sizeof *u->hinge_length);
-    return drape_arena_status(u->arena);
-}
-
-static void copy_open(drape_untangler *u, int32_t collider)
-{
-    drape_sheets *s = &u->sheets;
-    const drape_collider_shape *shape = &u->model->colliders[collider].shape;
-    const int32_t first = u->broad.first_point[collider];
-    for (int32_t i = 0; i < 2 * shape->segment_count; i++)
-        s->edge[2 * (size_t)s->edge_count + (size_t)i] = first + shape->segment[i];
-    for (int32_t i = 0; i < 3 * shape->triangle_count; i++)
-        s->triangle[3 * (size_t)s->triangle_count + (size_t)i] = first + shape->triangle[i];
-    s->edge_count += shape->segment_count;
-    s->triangle_count += shape->triangle_count;
-}
-
-/* The triangles at each edge, and the nodes opposite of it: their distance is how the sheet bends there. */
-static void list_hinges(drape_untangler *u)
-{
-    drape_sheets *s = &u->sheets;
-    memset(s->edge_triangle, -1, 2 * (size_t)s->edge_count * sizeof *s->edge_triangle);
-    for (int32_t f = 0; f < s->triangle_count; f++)
-        for (int a = 0; a < 3; a++) {
-            const int32_t *t = s->triangle + 3 * (size_t)f,
-                          e = drape_elements_of_edge(&s->edges, s->edge, t[a], t[(a + 1) % 3]);
-            if (e >= 0)
-                s->edge_triangle[2 * (size_t)e + (s->edge_triangle[2 * (size_t)e] >= 0)] = f;
-        }
-    for (int32_t e = 0; e < u->model->edge_count; e++) {
-        const int32_t *at = s->edge_triangle + 2 * (size_t)e, *ends = s->edge + 2 * (size_t)e;
-        if (at[1] < 0)
-            continue;
-        for (int k = 0; k < 2; k++) {
-            const int32_t *t = s->triangle + 3 * (size_t)at[k];
-            int a = 0;
-            while (t[a] == ends[0] || t[a] == ends[1])
-                a++;
-            u->hinge[2 * (size_t)u->hinge_count + (size_t)k] = t[a];
-        }
-        u->hinge_count++;
-    }
-}
-
 static double between(const double *x, const int32_t *pair)
 {
     double d[3];
@@ -109,8 +48,16 @@ static drape_status list_sheets(drape_untangler *u)
     s->edge_count = m->edge_count;
     s->triangle_count = m->triangle_count;
     for (int32_t c = 0; c < m->collider_count; c++)
-        if (u->open[c])
-            copy_open(u, c);
+        if (u->open[c]) {
+            const drape_collider_shape *shape = &u->model->colliders[c].shape;
+            const int32_t first = u->broad.first_point[c];
+            for (int32_t i = 0; i < 2 * shape->segment_count; i++)
+                s->edge[2 * (size_t)s->edge_count + (size_t)i] = first + shape->segment[i];
+            for (int32_t i = 0; i < 3 * shape->triangle_count; i++)
+                s->triangle[3 * (size_t)s->triangle_count + (size_t)i] = first + shape->triangle[i];
+            s->edge_count += shape->segment_count;
+            s->triangle_count += shape->triangle_count;
+        }
     for (int32_t i = 0; i < u->broad.points; i++)
         s->of_point[i] = i < m->node_count ? drape_model_cloth_of(m, i)
                                            : m->cloth_count + u->broad.point_collider[i - m->node_count];
@@ -118,7 +65,29 @@ static drape_status list_sheets(drape_untangler *u)
         drape_elements_of_create(u->arena, s->edge_count, 2, s->edge, u->broad.points, &s->edges);
     if (status)
         return status;
-    list_hinges(u);
+    /* The triangles at each edge, and the nodes opposite of it: their distance is how the sheet bends
+     * there. */
+    memset(s->edge_triangle, -1, 2 * (size_t)s->edge_count * sizeof *s->edge_triangle);
+    for (int32_t f = 0; f < s->triangle_count; f++)
+        for (int a = 0; a < 3; a++) {
+            const int32_t *t = s->triangle + 3 * (size_t)f,
+                          e = drape_elements_of_edge(&s->edges, s->edge, t[a], t[(a + 1) % 3]);
+            if (e >= 0)
+                s->edge_triangle[2 * (size_t)e + (s->edge_triangle[2 * (size_t)e] >= 0)] = f;
+        }
+    for (int32_t e = 0; e < u->model->edge_count; e++) {
+        const int32_t *at = s->edge_triangle + 2 * (size_t)e, *ends = s->edge + 2 * (size_t)e;
+        if (at[1] < 0)
+            continue;
+        for (int k = 0; k < 2; k++) {
+            const int32_t *t = s->triangle + 3 * (size_t)at[k];
+            int a = 0;
+            while (t[a] == ends[0] || t[a] == ends[1])
+                a++;
+            u->hinge[2 * (size_t)u->hinge_count + (size_t)k] = t[a];
+        }
+        u->hinge_count++;
+    }
     for (int32_t e = 0; e < m->edge_count; e++) {
         u->length[e] = between(u->x, m->edge + 2 * (size_t)e);
         u->mean_edge += u->length[e] / m->edge_count;
@@ -208,45 +177,33 @@ static drape_status place_bodies(drape_untangler *u, const drape_motion *motion,
 
 /* ---- Setting up ---- */
 
-static drape_status take_arrays(drape_untangler *u)
-{
-    const size_t points = (size_t)u->broad.points, colliders = (size_t)u->model->collider_count,
-                 edges = (size_t)u->model->edge_count;
-    u->pose = drape_arena_take(u->arena, colliders, sizeof *u->pose);
-    u->body = drape_arena_take(u->arena, colliders, sizeof *u->body);
-    u->open = drape_arena_take(u->arena, colliders, sizeof *u->open);
-    u->box = drape_arena_take(u->arena, colliders, sizeof *u->box);
-    u->x = drape_arena_take(u->arena, points, 3 * sizeof *u->x);
-    u->start = drape_arena_take(u->arena, points, 3 * sizeof *u->start);
-    u->best = drape_arena_take(u->arena, points, 3 * sizeof *u->best);
-    u->mobility = drape_arena_take(u->arena, points, sizeof *u->mobility);
-    u->moved = drape_arena_take(u->arena, points, sizeof *u->moved);
-    u->passes = drape_arena_take(u->arena, points, sizeof *u->passes);
-    u->colour = drape_arena_take(u->arena, points, sizeof *u->colour);
-    u->queue = drape_arena_take(u->arena, points, sizeof *u->queue);
-    u->sunk = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->sunk);
-    u->depth = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->depth);
-    u->outward = drape_arena_take(u->arena, (size_t)u->model->node_count, 3 * sizeof *u->outward);
-    u->piece = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->piece);
-    u->face_area = drape_arena_take(u->arena, (size_t)u->model->triangle_count, sizeof *u->face_area);
-    u->length = drape_arena_take(u->arena, edges, sizeof *u->length);
-    return drape_arena_status(u->arena);
-}
-
-static void set_rounding(drape_untangler *u)
-{
-    double largest = 0;
-    for (size_t i = 0; i < 3 * (size_t)u->broad.points; i++)
-        largest = fmax(largest, fabs(u->x[i]));
-    u->broad.rounding = DRAPE_CLOSEST_ROUNDING * largest;
-}
-
 static drape_status set_up(drape_untangler *u, const drape_motion *motion, double t, const double *x)
 {
     const drape_model *m = u->model;
     drape_status status = drape_broad_phase_create(u->arena, m, &u->broad);
-    if (!status)
-        status = take_arrays(u);
+    if (!status) {
+        const size_t points = (size_t)u->broad.points, colliders = (size_t)u->model->collider_count,
+                     edges = (size_t)u->model->edge_count;
+        u->pose = drape_arena_take(u->arena, colliders, sizeof *u->pose);
+        u->body = drape_arena_take(u->arena, colliders, sizeof *u->body);
+        u->open = drape_arena_take(u->arena, colliders, sizeof *u->open);
+        u->box = drape_arena_take(u->arena, colliders, sizeof *u->box);
+        u->x = drape_arena_take(u->arena, points, 3 * sizeof *u->x);
+        u->start = drape_arena_take(u->arena, points, 3 * sizeof *u->start);
+        u->best = drape_arena_take(u->arena, points, 3 * sizeof *u->best);
+        u->mobility = drape_arena_take(u->arena, points, sizeof *u->mobility);
+        u->moved = drape_arena_take(u->arena, points, sizeof *u->moved);
+        u->passes = drape_arena_take(u->arena, points, sizeof *u->passes);
+        u->colour = drape_arena_take(u->arena, points, sizeof *u->colour);
+        u->queue = drape_arena_take(u->arena, points, sizeof *u->queue);
+        u->sunk = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->sunk);
+        u->depth = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->depth);
+        u->outward = drape_arena_take(u->arena, (size_t)u->model->node_count, 3 * sizeof *u->outward);
+        u->piece = drape_arena_take(u->arena, (size_t)u->model->node_count, sizeof *u->piece);
+        u->face_area = drape_arena_take(u->arena, (size_t)u->model->triangle_count, sizeof *u->face_area);
+        u->length = drape_arena_take(u->arena, edges, sizeof *u->length);
+        status = drape_arena_status(u->arena);
+    }
     if (status)
         return status;
     memcpy(u->x, x, 3 * (size_t)m->node_count * sizeof *x);
@@ -259,15 +216,34 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
     for (int32_t i = 0; m->image_set_count > 0 && i < m->image_start[m->image_set_count]; i++)
         u->mobility[m->image[i]] = 0; /* nor would these keep their period */
     status = place_bodies(u, motion, t);
-    if (!status)
-        status = take_sheets(u);
+    if (!status) {
+        drape_sheets *s = &u->sheets;
+        const size_t points = (size_t)u->broad.points;
+        size_t edges = (size_t)m->edge_count, triangles = (size_t)m->triangle_count;
+        for (int32_t c = 0; c < m->collider_count; c++)
+            if (u->open[c]) {
+                edges += (size_t)m->colliders[c].shape.segment_count;
+                triangles += (size_t)m->colliders[c].shape.triangle_count;
+            }
+        s->edge = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge);
+        s->triangle = drape_arena_take(u->arena, triangles, 3 * sizeof *s->triangle);
+        s->edge_triangle = drape_arena_take(u->arena, edges, 2 * sizeof *s->edge_triangle);
+        s->of_point = drape_arena_take(u->arena, points, sizeof *s->of_point);
+        u->block = drape_arena_take(u->arena, edges, sizeof *u->block);
+        u->hinge = drape_arena_take(u->arena, edges, 2 * sizeof *u->hinge);
+        u->hinge_length = drape_arena_take(u->arena, edges, sizeof *u->hinge_length);
+        status = drape_arena_status(u->arena);
+    }
     if (!status)
         status = list_sheets(u);
     if (status)
         return status;
     list_pieces(u);
     u->exit = drape_arena_take(u->arena, (size_t)u->piece_count, sizeof *u->exit);
-    set_rounding(u);
+    double largest = 0;
+    for (size_t i = 0; i < 3 * (size_t)u->broad.points; i++)
+        largest = fmax(largest, fabs(u->x[i]));
+    u->broad.rounding = DRAPE_CLOSEST_ROUNDING * largest;
     return u->exit ? build_trees(u) : DRAPE_E_MEMORY;
 }
 
@@ -336,12 +312,6 @@ typedef struct rank {
     double gap, strain;
 } rank;
 
-static rank rank_of(const drape_untangler *u)
-{
-    return (rank){is_sound(u), u->crossing_count + u->sunk_count, u->sunk_count, fmin(u->min_wanted, ENOUGH),
-                  strain_of(u)};
-}
-
 /* Whether a is better than b, and in no count worse than the start. */
 static bool is_better(const rank *a, const rank *b, const rank *first)
 {
@@ -350,14 +320,6 @@ static bool is_better(const rank *a, const rank *b, const rank *first)
     if (a->crossings != b->crossings)
         return a->crossings < b->crossings;
     return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
-}
-
-static void keep(drape_untangler *u, drape_untangle_outcome *outcome)
-{
-    outcome->crossings = u->crossing_count;
-    outcome->sunk = u->sunk_count;
-    outcome->min_share = u->min_share;
-    memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
 }
 
 /* Sweeps until nothing passes through anything, then for gaps, and then as long as there is strain that gets
@@ -373,7 +335,8 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         if (status)
             return status;
         outcome->sweeps = i;
-        const rank here = rank_of(u);
+        const rank here = {is_sound(u), u->crossing_count + u->sunk_count, u->sunk_count,
+                           fmin(u->min_wanted, ENOUGH), strain_of(u)};
         if (i == 0)
             first = here;
         const double gain = best.strain - here.strain;
@@ -386,7 +349,10 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
                     : since + 1;
         if (better) {
             best = here;
-            keep(u, outcome);
+            outcome->crossings = u->crossing_count;
+            outcome->sunk = u->sunk_count;
+            outcome->min_share = u->min_share;
+            memcpy(u->best, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
         }
         const bool clear = best.crossings == 0 && best.gap >= ENOUGH;
         if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||

@@ -55,40 +55,6 @@ static void push(drape_untangler *u, int32_t collider, const int32_t *node, cons
 
 /* ---- Nodes ---- */
 
-/* The depth of all nodes in the body in which they are deepest, and the gradient of the distance there. */
-static void measure(drape_untangler *u)
-{
-    const drape_model *m = u->model;
-    for (int32_t i = 0; i < m->node_count; i++)
-        u->depth[i] = 0;
-    for (int32_t c = 0; c < m->collider_count; c++)
-        for (int32_t i = 0; i < m->node_count && !u->open[c]; i++) {
-            double n[3];
-            if (drape_model_ignores(m, c, i) || !is_near(u, c, &i, 1, 0))
-                continue;
-            const double d = distance_at(u, c, u->x + 3 * (size_t)i, n);
-            if (!(d < u->depth[i]))
-                continue;
-            u->depth[i] = d;
-            memcpy(u->outward + 3 * (size_t)i, n, sizeof n);
-        }
-}
-
-/* The signed distance of a point from all bodies that a node does not ignore, as far as it is in one. */
-static double depth_at(const drape_untangler *u, int32_t node, const double *x)
-{
-    double depth = 0;
-    for (int32_t c = 0; c < u->model->collider_count; c++) {
-        double(*const box)[3] = u->box[c];
-        bool within = !u->open[c] && !drape_model_ignores(u->model, c, node);
-        for (int k = 0; k < 3; k++)
-            within = within && x[k] >= box[0][k] && x[k] <= box[1][k];
-        if (within)
-            depth = fmin(depth, distance_at(u, c, x, NULL));
-    }
-    return depth;
-}
-
 /* The length of the path out of all bodies, in a direction, from a point of the piece of a node; infinite: it
  * does not lead out. */
 static double exit_length(const drape_untangler *u, int32_t node, const double *x, const double direction[3])
@@ -97,7 +63,17 @@ static double exit_length(const drape_untangler *u, int32_t node, const double *
     for (int k = 0; k < DRAPE_MAX_ADVANCES; k++) {
         double p[3] = {x[0], x[1], x[2]};
         vec3_add_scaled(length, direction, p);
-        const double d = depth_at(u, node, p);
+        /* The signed distance of a point from all bodies that a node does not ignore, as far as it is in
+         * one. */
+        double d = 0;
+        for (int32_t c = 0; c < u->model->collider_count; c++) {
+            double(*const box)[3] = u->box[c];
+            bool within = !u->open[c] && !drape_model_ignores(u->model, c, node);
+            for (int i = 0; i < 3; i++)
+                within = within && p[i] >= box[0][i] && p[i] <= box[1][i];
+            if (within)
+                d = fmin(d, distance_at(u, c, p, NULL));
+        }
         if (d >= -u->broad.rounding)
             return length;
         length -= d;
@@ -130,15 +106,6 @@ static void try_direction(const drape_untangler *u, int32_t piece, const double 
     memcpy(out->direction, direction, sizeof direction);
 }
 
-static void add_normal(const drape_untangler *u, const int32_t *node, double sum[3])
-{
-    double v[3], w[3], n[3];
-    vec3_sub(u->x + 3 * (size_t)node[1], u->x + 3 * (size_t)node[0], v);
-    vec3_sub(u->x + 3 * (size_t)node[2], u->x + 3 * (size_t)node[0], w);
-    vec3_cross(v, w, n);
-    vec3_add_scaled(1, n, sum);
-}
-
 /* Of a piece that is inside, unless its nodes agree. Directions that are tried: the mean of those
  * of its nodes, that of the least deep node, and both sides of the sheet, which needs no room sideways. */
 static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *out)
@@ -160,8 +127,14 @@ static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *
     if (agree)
         return;
     for (int32_t f = 0; f < m->triangle_count; f++)
-        if (u->piece[m->triangle[3 * (size_t)f]] == piece)
-            add_normal(u, m->triangle + 3 * (size_t)f, normal);
+        if (u->piece[m->triangle[3 * (size_t)f]] == piece) {
+            const int32_t *node = m->triangle + 3 * (size_t)f;
+            double v[3], w[3], n[3];
+            vec3_sub(u->x + 3 * (size_t)node[1], u->x + 3 * (size_t)node[0], v);
+            vec3_sub(u->x + 3 * (size_t)node[2], u->x + 3 * (size_t)node[0], w);
+            vec3_cross(v, w, n);
+            vec3_add_scaled(1, n, normal);
+        }
     for (int k = 0; k < 3; k++)
         back[k] = -normal[k];
     try_direction(u, piece, normal, &shortest, out);
@@ -398,7 +371,22 @@ drape_status drape_untangle_bodies(drape_untangler *u)
 {
     memset(u->sunk, 0, (size_t)u->model->node_count * sizeof *u->sunk);
     u->sunk_count = 0;
-    measure(u);
+    /* The depth of all nodes in the body in which they are deepest, and the gradient of the distance
+     * there. */
+    const drape_model *m = u->model;
+    for (int32_t i = 0; i < m->node_count; i++)
+        u->depth[i] = 0;
+    for (int32_t c = 0; c < m->collider_count; c++)
+        for (int32_t i = 0; i < m->node_count && !u->open[c]; i++) {
+            double n[3];
+            if (drape_model_ignores(m, c, i) || !is_near(u, c, &i, 1, 0))
+                continue;
+            const double d = distance_at(u, c, u->x + 3 * (size_t)i, n);
+            if (!(d < u->depth[i]))
+                continue;
+            u->depth[i] = d;
+            memcpy(u->outward + 3 * (size_t)i, n, sizeof n);
+        }
     drape_status status = choose_exits(u);
     for (int32_t c = 0; !status && c < u->model->collider_count; c++) {
         if (u->open[c])

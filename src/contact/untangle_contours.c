@@ -200,13 +200,6 @@ static void unmark(drape_untangler *u, const curve *k)
         u->block[u->crossing[k->crossing[i]].edge] = 0;
 }
 
-/* How much it costs to move a node: a pin, more than all of the cloth, so that its part is not moved if
- * another can be. */
-static double price_of(const drape_untangler *u, int32_t node)
-{
-    return u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : 2 * u->area);
-}
-
 /* Spreads colours from the first `count` nodes of the queue to all others that edges lead to; through a
  * blocked edge the other colour. Returns whether they agree everywhere. */
 static bool spread(drape_untangler *u, int32_t count, bool through, double price[2])
@@ -217,7 +210,7 @@ static bool spread(drape_untangler *u, int32_t count, bool through, double price
     for (int32_t i = 0; agree && i < count; i++) {
         const int32_t node = u->queue[i];
         const int8_t own = u->colour[node];
-        price[own] += price_of(u, node);
+        price[own] += u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : 2 * u->area);
         for (int32_t a = s->edges.first[node]; agree && a < s->edges.first[node + 1]; a++) {
             const int32_t e = s->edges.element[a], *ends = s->edge + 2 * (size_t)e,
                           other = ends[0] == node ? ends[1] : ends[0];
@@ -347,15 +340,6 @@ static bool is_boundary(const drape_sheets *s, int32_t a, int32_t b)
     return edge >= 0 && s->edge_triangle[2 * (size_t)edge + 1] < 0;
 }
 
-/* Whether a place on a triangle is on the boundary of its sheet. */
-static bool is_at_boundary(const drape_sheets *s, const int32_t *corner, const double weight[3])
-{
-    for (int a = 0; a < 3; a++)
-        if (weight[a] <= 0 && is_boundary(s, corner[(a + 1) % 3], corner[(a + 2) % 3]))
-            return true;
-    return false;
-}
-
 /* A node of a part on the wrong side, away from the curve, goes towards the place of the other sheet that is
  * nearest to it, as far as a sweep goes: so the part turns as a whole and is not pulled along by its edge. */
 static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int side)
@@ -367,8 +351,10 @@ static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int sid
     if (place.triangle < 0)
         return;
     const int32_t *corner = tree->node + 3 * (size_t)place.triangle;
-    if (is_at_boundary(&u->sheets, corner, place.weights))
-        return;
+    /* Whether a place on a triangle is on the boundary of its sheet. */
+    for (int a = 0; a < 3; a++)
+        if (place.weights[a] <= 0 && is_boundary(&u->sheets, corner[(a + 1) % 3], corner[(a + 2) % 3]))
+            return;
     vec3_triangle_normal(corner, u->x, n);
     memcpy(d, x, sizeof d);
     for (int a = 0; a < 3; a++)

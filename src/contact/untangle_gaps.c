@@ -92,33 +92,6 @@ static void normal_at(const drape_untangler *u, int32_t node, double n[3])
         }
 }
 
-/* Pieces at distance 0, such as layers that begin in one plane: the sheet that comes later goes to where the
- * normal of the earlier one points. */
-static void choose_normal(const drape_untangler *u, const drape_pair *pair, double n[3])
-{
-    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
-    const bool first = pair->node[0] < pair->node[3];
-    memset(n, 0, 3 * sizeof *n);
-    for (int a = first ? 0 : split; a < (first ? split : 4); a++) {
-        double own[3];
-        normal_at(u, pair->node[a], own);
-        vec3_add_scaled(first ? -1 : 1, own, n);
-    }
-    const double length = vec3_norm(n);
-    for (int k = 0; k < 3; k++)
-        n[k] = length > 0 ? n[k] / length : k == 1;
-}
-
-static void bound_pair(drape_untangler *u, const drape_pair *pair, const drape_closest *closest,
-                       double wanted)
-{
-    drape_half_space bound = {.bound = wanted + pair->radius};
-    memcpy(bound.node, pair->node, sizeof bound.node);
-    memcpy(bound.c, closest->c, sizeof bound.c);
-    memcpy(bound.normal, closest->normal, sizeof bound.normal);
-    drape_untangle_bound(u, &bound);
-}
-
 static void gather(void *user, const drape_pair *pair)
 {
     drape_untangler *u = user;
@@ -153,9 +126,27 @@ static void consider(const gathering *g, const drape_pair *found)
         u->min_share = fmin(u->min_share, gap / least);
     if (wanted > 0)
         u->min_wanted = fmin(u->min_wanted, gap / wanted);
-    if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding)
-        choose_normal(u, &pair, closest.normal);
-    bound_pair(u, &pair, &closest, wanted);
+    if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding) {
+        /* Pieces at distance 0, such as layers that begin in one plane: the sheet that comes later goes to
+         * where the normal of the earlier one points. */
+        double *n = closest.normal;
+        const int split = pair.kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+        const bool first = pair.node[0] < pair.node[3];
+        memset(n, 0, 3 * sizeof *n);
+        for (int a = first ? 0 : split; a < (first ? split : 4); a++) {
+            double own[3];
+            normal_at(u, pair.node[a], own);
+            vec3_add_scaled(first ? -1 : 1, own, n);
+        }
+        const double length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : k == 1;
+    }
+    drape_half_space bound = {.bound = wanted + pair.radius};
+    memcpy(bound.node, pair.node, sizeof bound.node);
+    memcpy(bound.c, closest.c, sizeof bound.c);
+    memcpy(bound.normal, closest.normal, sizeof bound.normal);
+    drape_untangle_bound(u, &bound);
 }
 
 drape_status drape_untangle_gaps(drape_untangler *u)

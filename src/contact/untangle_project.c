@@ -47,20 +47,6 @@ static void keep_bound(drape_untangler *u, const drape_half_space *bound)
     }
 }
 
-/* No point goes farther than what was searched. */
-static void limit(drape_untangler *u)
-{
-    const double most = drape_untangle_stride(u);
-    for (int32_t i = 0; i < u->model->node_count; i++) {
-        double *x = u->x + 3 * (size_t)i, move[3];
-        const double *from = u->start + 3 * (size_t)i;
-        vec3_sub(x, from, move);
-        const double length = vec3_norm(move);
-        for (int k = 0; length > most && k < 3; k++)
-            x[k] = from[k] + move[k] * (most / length);
-    }
-}
-
 void drape_untangle_project(drape_untangler *u)
 {
     const drape_model *m = u->model;
@@ -72,5 +58,14 @@ void drape_untangle_project(drape_untangler *u)
         for (int32_t b = 0; b < u->bounds.count; b++)
             keep_bound(u, &u->bounds.list[b]);
     }
-    limit(u);
+    /* No point goes farther than what was searched. */
+    const double most = drape_untangle_stride(u);
+    for (int32_t i = 0; i < u->model->node_count; i++) {
+        double *x = u->x + 3 * (size_t)i, move[3];
+        const double *from = u->start + 3 * (size_t)i;
+        vec3_sub(x, from, move);
+        const double length = vec3_norm(move);
+        for (int k = 0; length > most && k < 3; k++)
+            x[k] = from[k] + move[k] * (most / length);
+    }
 }

@@ -57,8 +57,9 @@ static void on_face(double v, double w, drape_closest *at)
     at->dcdt[0][2] = at->dcdt[1][3] = -1;
 }
 
-static void classify_triangle(double x[4][3], drape_closest *at)
+void drape_closest_point_triangle(double x[4][3], drape_closest *at)
 {
+    *at = (drape_closest){.points = 4, .c = {1}};
     double ab[3], ac[3], ap[3], bp[3], cp[3];
     vec3_sub(x[2], x[1], ab);
     vec3_sub(x[3], x[1], ac);
@@ -82,12 +83,6 @@ static void classify_triangle(double x[4][3], drape_closest *at)
         on_edge(2, 3, (d4 - d3) / ((d4 - d3) + (d5 - d6)), at);
     else
         on_face(vb / (va + vb + vc), vc / (va + vb + vc), at);
-}
-
-void drape_closest_point_triangle(double x[4][3], drape_closest *at)
-{
-    *at = (drape_closest){.points = 4, .c = {1}};
-    classify_triangle(x, at);
     measure(x, at);
 }
 
@@ -114,8 +109,9 @@ static double nearest(double along, double length2)
     return length2 > 0 ? clamp01(along / length2) : 0;
 }
 
-static void classify_segments(double x[4][3], drape_closest *at)
+void drape_closest_segments(double x[4][3], drape_closest *at)
 {
+    *at = (drape_closest){.points = 4};
     double u[3], w[3], r[3];
     vec3_sub(x[1], x[0], u);
     vec3_sub(x[3], x[2], w);
@@ -126,12 +122,6 @@ static void classify_segments(double x[4][3], drape_closest *at)
     double s = parallel ? 0 : clamp01((b * f - c * e) / area2), t = nearest(b * s + f, e);
     s = nearest(b * t - c, a);
     between(s, t, s > 0 && s < 1 && !(parallel && t > 0 && t < 1), t > 0 && t < 1, at);
-}
-
-void drape_closest_segments(double x[4][3], drape_closest *at)
-{
-    *at = (drape_closest){.points = 4};
-    classify_segments(x, at);
     measure(x, at);
 }
 

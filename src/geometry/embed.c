@@ -7,24 +7,6 @@
 
 #include "base/vec3.h"
 
-/* Weights and height along the normal of the triangle: the components of the point in its frame. */
-static void bind_flat(const double *x, const double point[3], drape_embedded *to)
-{
-    const double *x0 = x + 3 * (size_t)to->node[0];
-    double u[3], v[3], n[3], d[3];
-    vec3_sub(x + 3 * (size_t)to->node[1], x0, u);
-    vec3_sub(x + 3 * (size_t)to->node[2], x0, v);
-    vec3_sub(point, x0, d);
-    vec3_triangle_normal(to->node, x, n);
-    const double uu = vec3_dot(u, u), uv = vec3_dot(u, v), vv = vec3_dot(v, v), area = uu * vv - uv * uv;
-    const double du = vec3_dot(d, u), dv = vec3_dot(d, v);
-    to->weights[1] = area > 0 ? (vv * du - uv * dv) / area : 0;
-    to->weights[2] = area > 0 ? (uu * dv - uv * du) / area : 0;
-    to->weights[0] = 1 - to->weights[1] - to->weights[2];
-    to->height = vec3_dot(d, n);
-    to->flat = true;
-}
-
 /* One Newton step of  sum w_i (x_i + h n_i) = point  in w_1, w_2 and h; the residual r = point - sum.
  * Cramer's rule. Returns whether the columns are independent. */
 static bool improve(const double *x, const double *normals, const double r[3], drape_embedded *e)
@@ -80,7 +62,20 @@ double drape_embed(const drape_bvh *tree, const double *x, const double *normals
     const drape_on_triangle at = drape_nearest_on(tree, x, point, INFINITY);
     to->triangle = at.triangle;
     memcpy(to->node, tree->node + 3 * (size_t)at.triangle, sizeof to->node);
-    bind_flat(x, point, to);
+    /* Weights and height along the normal of the triangle: the components of the point in its frame. */
+    const double *x0 = x + 3 * (size_t)to->node[0];
+    double u[3], v[3], n[3], d[3];
+    vec3_sub(x + 3 * (size_t)to->node[1], x0, u);
+    vec3_sub(x + 3 * (size_t)to->node[2], x0, v);
+    vec3_sub(point, x0, d);
+    vec3_triangle_normal(to->node, x, n);
+    const double uu = vec3_dot(u, u), uv = vec3_dot(u, v), vv = vec3_dot(v, v), area = uu * vv - uv * uv;
+    const double du = vec3_dot(d, u), dv = vec3_dot(d, v);
+    to->weights[1] = area > 0 ? (vv * du - uv * dv) / area : 0;
+    to->weights[2] = area > 0 ? (uu * dv - uv * du) / area : 0;
+    to->weights[0] = 1 - to->weights[1] - to->weights[2];
+    to->height = vec3_dot(d, n);
+    to->flat = true;
     if (normals) {
         drape_embedded smooth = *to;
         if (bind_smooth(x, normals, point, at.distance, &smooth))

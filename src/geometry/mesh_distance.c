@@ -45,24 +45,6 @@ static double angle_between(const double *a, const double *b)
     return drape_atan2(vec3_norm(cross), vec3_dot(a, b));
 }
 
-static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_distance *mesh)
-{
-    double *n = mesh->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
-    vec3_sub(corner(s, t, 1), corner(s, t, 0), to_next);
-    vec3_sub(corner(s, t, 2), corner(s, t, 0), to_last);
-    vec3_cross(to_next, to_last, n);
-    double length = vec3_norm(n);
-    for (int k = 0; k < 3; k++)
-        n[k] = length > 0 ? n[k] / length : 0; /* between two frames a triangle may vanish */
-    for (int k = 0; k < 3; k++) {
-        size_t at = 3 * (size_t)t + (size_t)k;
-        vec3_sub(corner(s, t, k + 1), corner(s, t, k), to_next);
-        vec3_sub(corner(s, t, k + 2), corner(s, t, k), to_last);
-        vec3_add_scaled(angle_between(to_next, to_last), n, mesh->point_normal + 3 * (size_t)s->triangle[at]);
-        vec3_add_scaled(1, n, mesh->edge_normal + 3 * (size_t)mesh->edge_of[at]);
-    }
-}
-
 drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape,
                                                 drape_mesh_side side)
 {
@@ -91,8 +73,23 @@ void drape_mesh_distance_refit(drape_mesh_distance *mesh, const drape_collider_s
     drape_bvh_fit(&mesh->boxes, shape->point);
     memset(mesh->edge_normal, 0, 3 * (size_t)shape->segment_count * sizeof *mesh->edge_normal);
     memset(mesh->point_normal, 0, 3 * (size_t)shape->point_count * sizeof *mesh->point_normal);
-    for (int32_t t = 0; t < shape->triangle_count; t++)
-        add_normals(shape, t, mesh);
+    for (int32_t t = 0; t < shape->triangle_count; t++) {
+        double *n = mesh->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
+        vec3_sub(corner(shape, t, 1), corner(shape, t, 0), to_next);
+        vec3_sub(corner(shape, t, 2), corner(shape, t, 0), to_last);
+        vec3_cross(to_next, to_last, n);
+        double length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : 0; /* between two frames a triangle may vanish */
+        for (int k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)t + (size_t)k;
+            vec3_sub(corner(shape, t, k + 1), corner(shape, t, k), to_next);
+            vec3_sub(corner(shape, t, k + 2), corner(shape, t, k), to_last);
+            vec3_add_scaled(angle_between(to_next, to_last), n,
+                            mesh->point_normal + 3 * (size_t)shape->triangle[at]);
+            vec3_add_scaled(1, n, mesh->edge_normal + 3 * (size_t)mesh->edge_of[at]);
+        }
+    }
 }
 
 drape_mesh_side drape_mesh_distance_side(const drape_mesh_distance *mesh)
@@ -213,15 +210,6 @@ static nearest find_nearest(const drape_mesh_distance *mesh, const drape_collide
 
 /* ---- The distance ---- */
 
-static double face_distance(const double *n, const double *from, double *normal, double *curvature)
-{
-    if (normal)
-        memcpy(normal, n, 3 * sizeof *normal);
-    if (curvature)
-        memset(curvature, 0, 9 * sizeof *curvature);
-    return vec3_dot(from, n);
-}
-
 /* Returns the signed distance from an edge with the direction u, or from a point (u NULL). On the edge or
  * point itself the normal is the pseudo-normal. */
 static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
@@ -245,7 +233,12 @@ static double distance_by_normal(const drape_mesh_distance *mesh, const drape_co
     double from[3], u[3];
     if (found.kind == FACE) {
         vec3_sub(x, corner(shape, found.triangle, 0), from);
-        return face_distance(mesh->face_normal + 3 * (size_t)found.triangle, from, normal, curvature);
+        const double *n = mesh->face_normal + 3 * (size_t)found.triangle;
+        if (normal)
+            memcpy(normal, n, 3 * sizeof *normal);
+        if (curvature)
+            memset(curvature, 0, 9 * sizeof *curvature);
+        return vec3_dot(from, n);
     }
     vec3_sub(x, found.at, from);
     if (found.kind == POINT)

@@ -139,17 +139,6 @@ static inline void search_row(const drape_neighbours *s, search *q, int32_t y, i
     search_range(s, q, row, 0, s->start[last - s->buckets]);
 }
 
-static void sort_numbers(int32_t *number, int count)
-{
-    for (int i = 1; i < count; i++) {
-        int32_t moved = number[i];
-        int k = i;
-        for (; k > 0 && number[k - 1] > moved; k--)
-            number[k] = number[k - 1];
-        number[k] = moved;
-    }
-}
-
 int drape_neighbours_search(const drape_neighbours *s, int32_t point, const double *x,
                             int32_t found[DRAPE_MAX_NEIGHBOURS + 1])
 {
@@ -164,7 +153,13 @@ int drape_neighbours_search(const drape_neighbours *s, int32_t point, const doub
             search_row(s, &q, y, z);
     if (q.count > DRAPE_MAX_NEIGHBOURS)
         return -1;
-    sort_numbers(found, q.count);
+    for (int i = 1; i < q.count; i++) {
+        int32_t moved = found[i];
+        int j = i;
+        for (; j > 0 && found[j - 1] > moved; j--)
+            found[j] = found[j - 1];
+        found[j] = moved;
+    }
     return q.count;
 }
 
@@ -201,20 +196,6 @@ static void surround(const drape_neighbours *s, uint64_t row, int32_t bucket, in
     a->range[a->count++].last = s->start[end - s->buckets];
 }
 
-static void find_surroundings(const drape_neighbours *s, int32_t at, surroundings *a)
-{
-    int32_t box[3];
-    box_of(s, s->x + 3 * (size_t)at, box);
-    a->bucket = bucket_of(s, box[0], box[1], box[2]);
-    a->row = s->row[at];
-    a->count = 0;
-    surround(s, a->row, bucket_of(s, box[0] + 1, box[1], box[2]), 1, a);
-    for (int k = 0; k < ROWS; k++) {
-        int32_t y = box[1] + rows_ahead[k][0], z = box[2] + rows_ahead[k][1];
-        surround(s, row_of(y, z), bucket_of(s, box[0] - 1, y, z), 3, a);
-    }
-}
-
 /* Adds the pairs of a point with those from first to last; returns the new number of pairs. */
 static inline int32_t pair_with(const drape_neighbours *s, int32_t at, uint64_t row, int32_t first,
                                 int32_t last, double square_of_reach, int32_t count)
@@ -239,8 +220,18 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
     surroundings a = {.bucket = -1};
     for (int32_t at = 0; at < s->points; at++) {
         int32_t bucket = s->bucket[s->point[at]];
-        if (bucket != a.bucket || s->row[at] != a.row)
-            find_surroundings(s, at, &a);
+        if (bucket != a.bucket || s->row[at] != a.row) {
+            int32_t box[3];
+            box_of(s, s->x + 3 * (size_t)at, box);
+            a.bucket = bucket_of(s, box[0], box[1], box[2]);
+            a.row = s->row[at];
+            a.count = 0;
+            surround(s, a.row, bucket_of(s, box[0] + 1, box[1], box[2]), 1, &a);
+            for (int k = 0; k < ROWS; k++) {
+                int32_t y = box[1] + rows_ahead[k][0], z = box[2] + rows_ahead[k][1];
+                surround(s, row_of(y, z), bucket_of(s, box[0] - 1, y, z), 3, &a);
+            }
+        }
         int32_t last = s->start[bucket + 1], candidates = last - at;
         for (int k = 0; k < a.count; k++)
             candidates += a.range[k].last - a.range[k].first;

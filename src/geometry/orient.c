@@ -95,23 +95,6 @@ static bool are_exact(const double *x, const double *y)
     return low[0] == 0 && low[1] == 0 && low[2] == 0;
 }
 
-/* If u = b - a, v = c - a and w = d - a are exact, the volume is u . (v x w); in general it is b . (c x d) -
- * a . (c x d) + a . (b x d) - a . (b x c). */
-static int orient_exactly(const double *a, const double *b, const double *c, const double *d, const double *u,
-                          const double *v, const double *w)
-{
-    expansion sum = {.count = 0};
-    if (are_exact(b, a) && are_exact(c, a) && are_exact(d, a)) {
-        add_triple(&sum, 1, u, v, w);
-        return sign_of(&sum);
-    }
-    add_triple(&sum, 1, b, c, d);
-    add_triple(&sum, -1, a, c, d);
-    add_triple(&sum, 1, a, b, d);
-    add_triple(&sum, -1, a, b, c);
-    return sign_of(&sum);
-}
-
 int drape_orient(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], v[3], w[3], n[3];
@@ -125,5 +108,16 @@ int drape_orient(const double *a, const double *b, const double *c, const double
     for (int k = 0; k < 3; k++) /* layers that lie on each other in a plane of space, without long sums */
         if (u[k] == 0 && v[k] == 0 && w[k] == 0)
             return 0;
-    return orient_exactly(a, b, c, d, u, v, w);
+    /* If u = b - a, v = c - a and w = d - a are exact, the volume is u . (v x w); in general it is b . (c
+     * x d) - a . (c x d) + a . (b x d) - a . (b x c). */
+    expansion sum = {.count = 0};
+    if (are_exact(b, a) && are_exact(c, a) && are_exact(d, a)) {
+        add_triple(&sum, 1, u, v, w);
+        return sign_of(&sum);
+    }
+    add_triple(&sum, 1, b, c, d);
+    add_triple(&sum, -1, a, c, d);
+    add_triple(&sum, 1, a, b, d);
+    add_triple(&sum, -1, a, b, c);
+    return sign_of(&sum);
 }

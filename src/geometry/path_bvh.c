@@ -87,25 +87,22 @@ static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
     return box;
 }
 
-static drape_box leaf_box(const drape_path_bvh *bvh, int32_t element, const double *x, const double *grow)
-{
-    const int32_t *node = bvh->node + (size_t)element * (size_t)bvh->nodes;
-    drape_box box = bvh->nodes == 2   ? box_of(node, 2, x) /* with loops of a known length */
-                    : bvh->nodes == 3 ? box_of(node, 3, x)
-                                      : box_of(node, bvh->nodes, x);
-    for (int k = 0; grow && k < 3; k++) {
-        box.low[k] -= grow[element];
-        box.high[k] += grow[element];
-    }
-    return box;
-}
-
 /* The box of a child at one end. */
 static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, const double *x,
                            const double *grow)
 {
-    if (child < 0)
-        return leaf_box(bvh, -1 - child, x, grow);
+    if (child < 0) {
+        const int32_t element = -1 - child;
+        const int32_t *node = bvh->node + (size_t)element * (size_t)bvh->nodes;
+        drape_box box = bvh->nodes == 2   ? box_of(node, 2, x) /* with loops of a known length */
+                        : bvh->nodes == 3 ? box_of(node, 3, x)
+                                          : box_of(node, bvh->nodes, x);
+        for (int k = 0; grow && k < 3; k++) {
+            box.low[k] -= grow[element];
+            box.high[k] += grow[element];
+        }
+        return box;
+    }
     const drape_path_branch *from = &bvh->branches[child];
     drape_box box;
     for (int k = 0; k < 3; k++) {
@@ -213,9 +210,12 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
 
 /* ---- Without a tree ---- */
 
-/* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
-static void find_sides(const drape_path_query *from, const drape_path_elements *among, uint8_t *side)
+/* An axis separates an element if all of its points are on the same side. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from,
+                         const drape_path_elements *among, const bool *marked, uint8_t *side,
+                         drape_bvh_visit *visit, void *user)
 {
+    /* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
     const double *const x = from->x, *const y = from->y ? from->y : from->x;
     const drape_box first = box_of(from->node, from->nodes, x), last = box_of(from->node, from->nodes, y);
     for (int32_t p = 0; p < among->points; p++) {
@@ -230,14 +230,6 @@ static void find_sides(const drape_path_query *from, const drape_path_elements *
         }
         side[i] = (uint8_t)sides;
     }
-}
-
-/* An axis separates an element if all of its points are on the same side. */
-void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from,
-                         const drape_path_elements *among, const bool *marked, uint8_t *side,
-                         drape_bvh_visit *visit, void *user)
-{
-    find_sides(from, among, side);
     for (int32_t i = 0; i < among->elements; i++) {
         const int32_t e = among->element[i], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
         unsigned int common = side[node[0]];

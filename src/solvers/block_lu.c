@@ -31,17 +31,12 @@ static void fill_tile(const drape_front_job *w, bool symmetric, int32_t first, i
             tile[S * c + r] = other[S * r + c];
 }
 
-static void copy_square(const double *tile, int32_t n, double *a)
-{
-    for (int32_t c = 0; c < n; c++)
-        memcpy(a + n * c, tile + S * c, (size_t)n * sizeof *a);
-}
-
 static int32_t count_negative(const double *tile, int32_t n)
 {
     double a[S * S], v[S * S];
     int32_t count = 0;
-    copy_square(tile, n, a);
+    for (int32_t c = 0; c < n; c++)
+        memcpy(a + n * c, tile + S * c, (size_t)n * sizeof *a);
     for (int32_t c = 0; c < n; c++) /* its two triangles differ by rounding errors */
         for (int32_t r = 0; r < c; r++)
             a[n * c + r] = a[n * r + c];
@@ -93,28 +88,6 @@ static void finish_strip(void *user, int64_t task)
                          row + S * first);
 }
 
-static bool factor_columns(const drape_front_job *w)
-{
-    const drape_front *f = w->f;
-    const drape_block_lu *lu = w->user;
-    for (int32_t first = 0; first < f->columns && !drape_fronts_cancelled(w->s); first += S) {
-        const int32_t diagonal = first / S, width = f->columns - first < S ? f->columns - first : S;
-        const strip_job strips = {w, first, width, 3 * w->s->e.first[w->index] + first};
-        const bool last = f->rows == 0 && first + width == f->columns;
-        double *tile = drape_front_strip(w, DRAPE_LOWER, diagonal) + S * first;
-        fill_tile(w, lu->symmetric, first, width);
-        drape_tile_multiply(drape_front_strip(w, DRAPE_LOWER, diagonal),
-                            drape_front_strip(w, DRAPE_UPPER, diagonal), first, width, false, tile);
-        if (lu->negative)
-            lu->negative[w->index] += count_negative(tile, width);
-        if (!factor_tile(lu, last, width, tile, strips.at))
-            return false;
-        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip,
-                       (void *)(uintptr_t)&strips);
-    }
-    return true;
-}
-
 /* Computes one column of tiles of the update, over chunks of the factored columns. */
 static void compute_update_column(void *user, int64_t task)
 {
@@ -138,8 +111,22 @@ static bool factor_front(drape_front_job *w)
     drape_front_assemble(w, DRAPE_LOWER);
     if (!lu->symmetric)
         drape_front_assemble(w, DRAPE_UPPER);
-    if (!factor_columns(w))
-        return false;
+    const drape_front *f = w->f;
+    for (int32_t first = 0; first < f->columns && !drape_fronts_cancelled(w->s); first += S) {
+        const int32_t diagonal = first / S, width = f->columns - first < S ? f->columns - first : S;
+        const strip_job strips = {w, first, width, 3 * w->s->e.first[w->index] + first};
+        const bool last = f->rows == 0 && first + width == f->columns;
+        double *tile = drape_front_strip(w, DRAPE_LOWER, diagonal) + S * first;
+        fill_tile(w, lu->symmetric, first, width);
+        drape_tile_multiply(drape_front_strip(w, DRAPE_LOWER, diagonal),
+                            drape_front_strip(w, DRAPE_UPPER, diagonal), first, width, false, tile);
+        if (lu->negative)
+            lu->negative[w->index] += count_negative(tile, width);
+        if (!factor_tile(lu, last, width, tile, strips.at))
+            return false;
+        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip,
+                       (void *)(uintptr_t)&strips);
+    }
     drape_parallel(w->pool, w->f->row_strips, compute_update_column, w);
     drape_front_extend_add(w, DRAPE_LOWER);
     if (!lu->symmetric)

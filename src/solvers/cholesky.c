@@ -34,22 +34,6 @@ static void finish_strip(void *user, int64_t task)
     drape_tile_divide(strips->width, strip_of(w, diagonal) + S * strips->first, strips->inverse, to);
 }
 
-static bool factor_columns(const drape_front_job *w)
-{
-    const drape_front *f = w->f;
-    for (int32_t first = 0; first < f->columns && !drape_fronts_cancelled(w->s); first += S) {
-        const int32_t diagonal = first / S, width = f->columns - first < S ? f->columns - first : S;
-        double *tile = strip_of(w, diagonal) + S * first,
-               *inverse = (double *)w->user + 3 * w->s->e.first[w->index] + first;
-        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), first, width, false, tile);
-        if (!drape_tile_factor(width, tile, inverse))
-            return false;
-        strip_job strips = {.of = w, .inverse = inverse, .first = first, .width = width};
-        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip, &strips);
-    }
-    return true;
-}
-
 /* Computes one column of tiles of the update, over chunks of the factored columns. */
 static void compute_update_column(void *user, int64_t task)
 {
@@ -68,8 +52,17 @@ static void compute_update_column(void *user, int64_t task)
 static bool factor_front(drape_front_job *w)
 {
     drape_front_assemble(w, DRAPE_LOWER);
-    if (!factor_columns(w))
-        return false;
+    const drape_front *f = w->f;
+    for (int32_t first = 0; first < f->columns && !drape_fronts_cancelled(w->s); first += S) {
+        const int32_t diagonal = first / S, width = f->columns - first < S ? f->columns - first : S;
+        double *tile = strip_of(w, diagonal) + S * first,
+               *inverse = (double *)w->user + 3 * w->s->e.first[w->index] + first;
+        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), first, width, false, tile);
+        if (!drape_tile_factor(width, tile, inverse))
+            return false;
+        strip_job strips = {.of = w, .inverse = inverse, .first = first, .width = width};
+        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip, &strips);
+    }
     drape_parallel(w->pool, w->f->row_strips, compute_update_column, w);
     drape_front_extend_add(w, DRAPE_LOWER);
     return true;

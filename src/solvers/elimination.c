@@ -37,38 +37,6 @@ typedef struct maker {
 
 static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER; /* of the whole process, as rand() is */
 
-/*
- * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two concurrent calls
- * would take each other's numbers and so find another order, with other bits in the results, and the host's
- * own sequence would restart. So only one thread at a time calls METIS, with a separate state of rand(). A
- * host that calls rand() from another thread meanwhile still disturbs it.
- *
- * METIS also installs handlers of SIGTERM and SIGABRT, out of which it jumps back and fails. The thread
- * blocks both signals meanwhile and then delivers them to the handlers of before.
- */
-static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
-{
-    char own[RAND_STATE];
-    sigset_t trapped, mask;
-    struct sigaction terminate, abort;
-    sigemptyset(&trapped);
-    sigaddset(&trapped, SIGTERM);
-    sigaddset(&trapped, SIGABRT);
-    pthread_mutex_lock(&metis_mutex);
-    pthread_sigmask(SIG_BLOCK, &trapped, &mask);
-    sigaction(SIGTERM, NULL, &terminate);
-    sigaction(SIGABRT, NULL, &abort);
-    char *before = initstate(1, own, sizeof own);
-    const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
-    if (before)
-        setstate(before);
-    sigaction(SIGTERM, &terminate, NULL);
-    sigaction(SIGABRT, &abort, NULL);
-    pthread_sigmask(SIG_SETMASK, &mask, NULL);
-    pthread_mutex_unlock(&metis_mutex);
-    return code;
-}
-
 static bool dissect(maker *m)
 {
     const drape_pattern *p = m->pattern;
@@ -84,7 +52,31 @@ static bool dissect(maker *m)
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    return dissect_locked(&n, start, other, options, m) == METIS_OK;
+    /* METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two concurrent
+     * calls would take each other's numbers and so find another order, with other bits in the results, and
+     * the host's own sequence would restart. So only one thread at a time calls METIS, with a separate
+     * state of rand(). A host that calls rand() from another thread meanwhile still disturbs it. METIS
+     * also installs handlers of SIGTERM and SIGABRT, out of which it jumps back and fails. The thread
+     * blocks both signals meanwhile and then delivers them to the handlers of before. */
+    char own[RAND_STATE];
+    sigset_t trapped, mask;
+    struct sigaction terminate, abort;
+    sigemptyset(&trapped);
+    sigaddset(&trapped, SIGTERM);
+    sigaddset(&trapped, SIGABRT);
+    pthread_mutex_lock(&metis_mutex);
+    pthread_sigmask(SIG_BLOCK, &trapped, &mask);
+    sigaction(SIGTERM, NULL, &terminate);
+    sigaction(SIGABRT, NULL, &abort);
+    char *before = initstate(1, own, sizeof own);
+    const int code = METIS_NodeND(&n, start, other, NULL, options, m->e->order, m->e->place);
+    if (before)
+        setstate(before);
+    sigaction(SIGTERM, &terminate, NULL);
+    sigaction(SIGABRT, &abort, NULL);
+    pthread_sigmask(SIG_SETMASK, &mask, NULL);
+    pthread_mutex_unlock(&metis_mutex);
+    return code == METIS_OK;
 }
 _Static_assert(sizeof(idx_t) == sizeof(int32_t), "METIS orders with the pattern's integers");
 #endif
@@ -122,22 +114,17 @@ static void find_parents(maker *m)
     }
 }
 
-static void list_children(maker *m)
-{
-    for (int32_t j = 0; j < m->e->n; j++)
-        m->head[j] = -1;
-    for (int32_t j = m->e->n - 1; j >= 0; j--)
-        if (m->parent[j] >= 0) {
-            m->next[j] = m->head[m->parent[j]];
-            m->head[m->parent[j]] = j;
-        }
-}
-
 /* A depth-first walk without recursion: a column is written when it has no children left. */
 static void find_postorder(maker *m)
 {
     int32_t written = 0;
-    list_children(m);
+    for (int32_t i = 0; i < m->e->n; i++)
+        m->head[i] = -1;
+    for (int32_t i = m->e->n - 1; i >= 0; i--)
+        if (m->parent[i] >= 0) {
+            m->next[i] = m->head[m->parent[i]];
+            m->head[m->parent[i]] = i;
+        }
     for (int32_t root = 0; root < m->e->n; root++) {
         int32_t depth = 0;
         if (m->parent[root] >= 0)
@@ -154,16 +141,6 @@ static void find_postorder(maker *m)
             }
         }
     }
-}
-
-/* Replaces the order by the postorder of the tree, in which the columns of a front are neighbours. */
-static void reorder(maker *m)
-{
-    for (int32_t k = 0; k < m->e->n; k++)
-        m->stack[k] = m->e->order[m->post[k]];
-    memcpy(m->e->order, m->stack, (size_t)m->e->n * sizeof *m->stack);
-    invert(m);
-    find_parents(m);
 }
 
 /* ---- Fronts ---- */
@@ -317,9 +294,38 @@ int32_t drape_front_find(const drape_elimination *e, int32_t front, int32_t row)
     return drape_front_columns(e, front) + low;
 }
 
-static drape_status keep(maker *m)
+static size_t row_bytes(const drape_pattern *p)
+{
+    return (size_t)p->block_start[p->block_count] * sizeof *p->block_row;
+}
+
+static drape_status make(maker *m)
 {
     drape_elimination *e = m->e;
+    const size_t n = (size_t)e->n;
+    int32_t **arrays[] = {&m->parent, &m->post, &m->head, &m->next, &m->mark, &m->stack, &m->length};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        *arrays[i] = drape_arena_take(&m->scratch, n, sizeof(int32_t));
+    m->rows = drape_arena_take(&m->scratch, n, sizeof *m->rows);
+    e->order = drape_arena_take(m->arena, n, sizeof *e->order);
+    e->place = drape_arena_take(m->arena, n, sizeof *e->place);
+    e->first = drape_arena_take(m->arena, n + 1, sizeof *e->first);
+    if (!(!drape_arena_status(&m->scratch) && !drape_arena_status(m->arena)))
+        return DRAPE_E_MEMORY;
+    if (!order(m))
+        return drape_fail_memory(m->arena->ctx, row_bytes(m->pattern));
+    invert(m);
+    find_parents(m);
+    find_postorder(m);
+    /* Replaces the order by the postorder of the tree, in which the columns of a front are neighbours. */
+    for (int32_t k = 0; k < m->e->n; k++)
+        m->stack[k] = m->e->order[m->post[k]];
+    memcpy(m->e->order, m->stack, (size_t)m->e->n * sizeof *m->stack);
+    invert(m);
+    find_parents(m);
+    if (!find_fronts(m))
+        return DRAPE_E_MEMORY;
+    merge_fronts(m);
     int32_t *front_of = m->mark;
     e->parent = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->parent);
     e->work = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->work);
@@ -346,41 +352,6 @@ static drape_status keep(maker *m)
     return DRAPE_OK;
 }
 
-static bool allocate(maker *m)
-{
-    drape_elimination *e = m->e;
-    const size_t n = (size_t)e->n;
-    int32_t **arrays[] = {&m->parent, &m->post, &m->head, &m->next, &m->mark, &m->stack, &m->length};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        *arrays[i] = drape_arena_take(&m->scratch, n, sizeof(int32_t));
-    m->rows = drape_arena_take(&m->scratch, n, sizeof *m->rows);
-    e->order = drape_arena_take(m->arena, n, sizeof *e->order);
-    e->place = drape_arena_take(m->arena, n, sizeof *e->place);
-    e->first = drape_arena_take(m->arena, n + 1, sizeof *e->first);
-    return !drape_arena_status(&m->scratch) && !drape_arena_status(m->arena);
-}
-
-static size_t row_bytes(const drape_pattern *p)
-{
-    return (size_t)p->block_start[p->block_count] * sizeof *p->block_row;
-}
-
-static drape_status make(maker *m)
-{
-    if (!allocate(m))
-        return DRAPE_E_MEMORY;
-    if (!order(m))
-        return drape_fail_memory(m->arena->ctx, row_bytes(m->pattern));
-    invert(m);
-    find_parents(m);
-    find_postorder(m);
-    reorder(m);
-    if (!find_fronts(m))
-        return DRAPE_E_MEMORY;
-    merge_fronts(m);
-    return keep(m);
-}
-
 /* ---- Sharing ---- */
 
 struct drape_shared_elimination {
@@ -394,13 +365,6 @@ struct drape_shared_elimination {
 static size_t start_bytes(const drape_pattern *p)
 {
     return ((size_t)p->block_count + 1) * sizeof *p->block_start;
-}
-
-static bool is_of(const drape_shared_elimination *shared, const drape_pattern *p)
-{
-    return shared->e.n == p->block_count &&
-           memcmp(shared->block_start, p->block_start, start_bytes(p)) == 0 &&
-           memcmp(shared->block_row, p->block_row, row_bytes(p)) == 0;
 }
 
 static drape_status make_shared(drape_shared_elimination *shared, const drape_pattern *pattern)
@@ -426,7 +390,9 @@ drape_status drape_elimination_share(drape_context *ctx, const drape_pattern *pa
 {
     drape_shared_elimination *shared = ctx->eliminations;
     *out = NULL;
-    while (shared && !is_of(shared, pattern))
+    while (shared && !(shared->e.n == pattern->block_count &&
+                       memcmp(shared->block_start, pattern->block_start, start_bytes(pattern)) == 0 &&
+                       memcmp(shared->block_row, pattern->block_row, row_bytes(pattern)) == 0))
         shared = shared->next;
     if (shared) {
         shared->users++;

@@ -5,24 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Multiplies by the factors, and finds the largest magnitude of each row and column. */
-static void scale(const drape_pattern *p, const double *row, const double *column, double *scaled,
-                  double *row_largest, double *column_largest)
-{
-    memset(row_largest, 0, (size_t)p->n * sizeof *row_largest);
-    for (int64_t j = 0; j < p->n; j++) {
-        double most = 0;
-        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
-            const int64_t i = drape_pattern_row(p, j, k);
-            scaled[k] *= row[i] * column[j];
-            const double size = fabs(scaled[k]);
-            most = size > most ? size : most;
-            row_largest[i] = size > row_largest[i] ? size : row_largest[i];
-        }
-        column_largest[j] = most;
-    }
-}
-
 /* Sets each step to a power of 2 near the inverse root of the largest magnitude, and multiplies the factors
  * by it. False if one is zero; *done stays true if all steps are 1. */
 static bool take_roots(int64_t n, const double *largest, double *step, double *factor, bool *done)
@@ -51,7 +33,19 @@ bool drape_equilibrate(const drape_pattern *p, const double *values, bool symmet
         row[i] = column[i] = row_step[i] = column_step[i] = 1;
     /* each pass halves the exponents; the largest then are between 1/4 and 2 */
     for (int range = DBL_MAX_EXP - DBL_MIN_EXP; regular && !done && range > 0; range /= 2) {
-        scale(p, row_step, column_step, scaled, row_largest, column_largest);
+        /* Multiplies by the factors, and finds the largest magnitude of each row and column. */
+        memset(row_largest, 0, (size_t)p->n * sizeof *row_largest);
+        for (int64_t j = 0; j < p->n; j++) {
+            double most = 0;
+            for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
+                const int64_t i = drape_pattern_row(p, j, k);
+                scaled[k] *= row_step[i] * column_step[j];
+                const double size = fabs(scaled[k]);
+                most = size > most ? size : most;
+                row_largest[i] = size > row_largest[i] ? size : row_largest[i];
+            }
+            column_largest[j] = most;
+        }
         done = true;
         regular = take_roots(p->n, symmetric ? column_largest : row_largest, row_step, row, &done) &&
                   take_roots(p->n, column_largest, column_step, column, &done);

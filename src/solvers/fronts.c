@@ -10,35 +10,6 @@
 
 /* ---- Storage of the fronts ---- */
 
-static int64_t update_tiles(const drape_front *f)
-{
-    return (int64_t)f->row_strips * (f->row_strips + 1) / 2;
-}
-
-static void measure_fronts(drape_fronts *s)
-{
-    for (int32_t i = s->e.count - 1; i >= 0; i--) {
-        drape_front *f = &s->front[i];
-        f->columns = 3 * drape_front_columns(&s->e, i);
-        f->rows = 3 * drape_front_rows(&s->e, i);
-        f->column_strips = (f->columns + S - 1) / S;
-        f->row_strips = (f->rows + S - 1) / S;
-        f->first_child = f->sibling = -1;
-        const int32_t up = s->e.parent[i];
-        if (up >= 0) {
-            f->sibling = s->front[up].first_child;
-            s->front[up].first_child = i;
-        }
-        s->widest = S * f->column_strips > s->widest ? S * f->column_strips : s->widest;
-        s->tallest = S * f->row_strips > s->tallest ? S * f->row_strips : s->tallest;
-    }
-    for (int32_t i = 0; i < s->e.count; i++) {
-        drape_front *f = &s->front[i];
-        f->panel = s->panel_size;
-        s->panel_size += (int64_t)(f->column_strips + f->row_strips) * S * f->columns;
-    }
-}
-
 /* Branches are the largest subtrees with at most 1 / BRANCHES of all work; the other fronts are the top. */
 static void find_branches(drape_fronts *s, double *work, int32_t *begin)
 {
@@ -79,7 +50,7 @@ static void push_update(drape_fronts *s, int32_t i, stacks *k)
         if (s->front[c].branch == f->branch && s->front[c].update < k->end[!f->odd])
             k->end[!f->odd] = s->front[c].update; /* the first child's lies deepest */
     f->update = k->end[f->odd];
-    k->end[f->odd] += update_tiles(f) * DRAPE_TILE;
+    k->end[f->odd] += ((int64_t)f->row_strips * (f->row_strips + 1) / 2) * DRAPE_TILE;
     k->peak[f->odd] = k->end[f->odd] > k->peak[f->odd] ? k->end[f->odd] : k->peak[f->odd];
 }
 
@@ -100,25 +71,6 @@ static void allocate_updates(drape_fronts *s)
         }
         s->update_size += k.peak[0] + k.peak[1];
     }
-}
-
-static drape_status lay_out_fronts(drape_arena *arena, drape_fronts *s)
-{
-    drape_arena scratch = drape_arena_of(arena->ctx);
-    const size_t count = (size_t)s->e.count;
-    double *work = drape_arena_take(&scratch, count, sizeof *work);
-    int32_t *begin = drape_arena_take(&scratch, count, sizeof *begin);
-    s->front = drape_arena_take(arena, count, sizeof *s->front);
-    s->branch = drape_arena_take(arena, count, 2 * sizeof *s->branch);
-    s->top = drape_arena_take(arena, count, sizeof *s->top);
-    const bool good = !drape_arena_status(&scratch) && !drape_arena_status(arena);
-    if (good) {
-        measure_fronts(s);
-        find_branches(s, work, begin);
-        allocate_updates(s);
-    }
-    drape_arena_free(&scratch);
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 /* ---- Positions of entries ---- */
@@ -200,9 +152,41 @@ int64_t drape_fronts_scratch(const drape_fronts *s)
 static drape_status lay_out(drape_arena *arena, drape_fronts *s)
 {
     const drape_pattern *pattern = s->pattern;
-    const drape_status status = lay_out_fronts(arena, s);
-    if (status)
-        return status;
+    drape_arena scratch = drape_arena_of(arena->ctx);
+    const size_t count = (size_t)s->e.count;
+    double *work = drape_arena_take(&scratch, count, sizeof *work);
+    int32_t *begin = drape_arena_take(&scratch, count, sizeof *begin);
+    s->front = drape_arena_take(arena, count, sizeof *s->front);
+    s->branch = drape_arena_take(arena, count, 2 * sizeof *s->branch);
+    s->top = drape_arena_take(arena, count, sizeof *s->top);
+    const bool good = !drape_arena_status(&scratch) && !drape_arena_status(arena);
+    if (good) {
+        for (int32_t i = s->e.count - 1; i >= 0; i--) {
+            drape_front *f = &s->front[i];
+            f->columns = 3 * drape_front_columns(&s->e, i);
+            f->rows = 3 * drape_front_rows(&s->e, i);
+            f->column_strips = (f->columns + S - 1) / S;
+            f->row_strips = (f->rows + S - 1) / S;
+            f->first_child = f->sibling = -1;
+            const int32_t up = s->e.parent[i];
+            if (up >= 0) {
+                f->sibling = s->front[up].first_child;
+                s->front[up].first_child = i;
+            }
+            s->widest = S * f->column_strips > s->widest ? S * f->column_strips : s->widest;
+            s->tallest = S * f->row_strips > s->tallest ? S * f->row_strips : s->tallest;
+        }
+        for (int32_t i = 0; i < s->e.count; i++) {
+            drape_front *f = &s->front[i];
+            f->panel = s->panel_size;
+            s->panel_size += (int64_t)(f->column_strips + f->row_strips) * S * f->columns;
+        }
+        find_branches(s, work, begin);
+        allocate_updates(s);
+    }
+    drape_arena_free(&scratch);
+    if (!good)
+        return DRAPE_E_MEMORY;
     const size_t n = (size_t)pattern->n, rows = (size_t)s->e.row_start[s->e.count];
     s->source[DRAPE_LOWER] = drape_arena_take(arena, lower_blocks(pattern), sizeof **s->source);
     s->target = drape_arena_take(arena, lower_blocks(pattern), sizeof *s->target);
@@ -250,23 +234,18 @@ drape_status drape_fronts_take_upper_panels(drape_arena *arena, drape_fronts *s)
     return DRAPE_OK;
 }
 
-/* Each block of `source` has row i and column j of the pattern: finds the one with row j and column i. */
-static void find_mirrored_blocks(const drape_fronts *s, int32_t *mirrored)
-{
-    const drape_pattern *p = s->pattern;
-    for (int32_t column = 0; column < s->e.n; column++)
-        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
-            mirrored[at] =
-                drape_pattern_find(p, s->e.order[column], p->block_row[s->source[DRAPE_LOWER][at]]);
-}
-
 drape_status drape_fronts_take_upper_updates(drape_arena *arena, drape_fronts *s)
 {
     int32_t *mirrored = drape_arena_take(arena, lower_blocks(s->pattern), sizeof *mirrored);
     double *updates = take_aligned(arena, s->update_size);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    find_mirrored_blocks(s, mirrored);
+    /* Each block of `source` has row i and column j of the pattern: finds the one with row j and column i. */
+    const drape_pattern *p = s->pattern;
+    for (int32_t column = 0; column < s->e.n; column++)
+        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
+            mirrored[at] =
+                drape_pattern_find(p, s->e.order[column], p->block_row[s->source[DRAPE_LOWER][at]]);
     s->source[DRAPE_UPPER] = mirrored;
     s->updates[DRAPE_UPPER] = updates;
     return DRAPE_OK;
@@ -316,27 +295,22 @@ static void add_child_column(void *user, int64_t task)
         add_block(from + r / A_STRIP * DRAPE_TILE + 3 * (r % A_STRIP), to + place[r]);
 }
 
-/* The first block row of a child's update that its parent does not factor. */
-static int32_t first_row_not_factored(const drape_fronts *s, int32_t child)
-{
-    const int32_t *place = s->in_update + s->e.row_start[child];
-    int32_t low = 0, high = s->front[child].rows / 3;
-    while (low < high) {
-        const int32_t middle = low + (high - low) / 2;
-        if (place[middle] < 0)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 /* Adds those columns of the children's updates that are factored in this front, or the others. */
 static void add_children(const drape_front_job *w, drape_half half, bool factored)
 {
     const drape_fronts *s = w->s;
     for (int32_t child = w->f->first_child; child >= 0; child = s->front[child].sibling) {
-        const int32_t middle = first_row_not_factored(s, child), all = s->front[child].rows / 3;
+        /* The first block row of a child's update that its parent does not factor. */
+        const int32_t *place = s->in_update + s->e.row_start[child];
+        int32_t low = 0, high = s->front[child].rows / 3;
+        while (low < high) {
+            const int32_t middle = low + (high - low) / 2;
+            if (place[middle] < 0)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        const int32_t middle = low, all = s->front[child].rows / 3;
         child_job columns = {.to = w, .half = half, .child = child, .first = factored ? 0 : middle};
         drape_parallel(w->pool, factored ? middle : all - middle, add_child_column, &columns);
     }

@@ -59,25 +59,20 @@ static drape_front_tile_solve tile_of(const part *w, int32_t strip)
                                     .x = w->x + first};
 }
 
-/* Adds what the children passed on to the front's columns and rows. */
-static void add_from_children(const drape_fronts *s, const part *w)
-{
-    const int32_t columns = w->f->columns / 3;
-    for (int32_t child = w->f->first_child; child >= 0; child = s->front[child].sibling)
-        for (int64_t k = s->e.row_start[child]; k < s->e.row_start[child + 1]; k++) {
-            const int32_t at = s->e.in_parent[k];
-            double *to = at < columns ? w->x + 3 * at : w->y + 3 * (at - columns);
-            for (int c = 0; c < 3; c++)
-                to[c] += s->left[3 * k + c];
-        }
-}
-
 static void solve_forward(const solve_job *job, int32_t i)
 {
     drape_fronts *s = job->s;
     const part w = part_of(s, i);
     const drape_front *f = w.f;
-    add_from_children(s, &w);
+    /* Adds what the children passed on to the front's columns and rows. */
+    const int32_t columns = w.f->columns / 3;
+    for (int32_t child = w.f->first_child; child >= 0; child = s->front[child].sibling)
+        for (int64_t k = s->e.row_start[child]; k < s->e.row_start[child + 1]; k++) {
+            const int32_t at = s->e.in_parent[k];
+            double *to = at < columns ? w.x + 3 * at : w.y + 3 * (at - columns);
+            for (int c = 0; c < 3; c++)
+                to[c] += s->left[3 * k + c];
+        }
     for (int32_t d = 0; d < f->column_strips; d++) {
         const drape_front_tile_solve t = tile_of(&w, d);
         if (job->solver->forward)

@@ -13,16 +13,6 @@ typedef struct auto_state {
     void *solver;
 } auto_state;
 
-/* The solver that is picked at the next larger sizes; NULL: none. */
-static const drape_linear_ops *next_larger(int64_t from)
-{
-    const drape_linear_ops *next = NULL;
-    for (int i = 0; drape_linears[i]; i++)
-        if (drape_linears[i]->best_from > from && (!next || drape_linears[i]->best_from < next->best_from))
-            next = drape_linears[i];
-    return next;
-}
-
 static void destroy(void **state)
 {
     auto_state *s = *state;
@@ -104,7 +94,12 @@ static size_t bytes(const void *state)
 static void report(const void *state, drape_linear_report *out)
 {
     const auto_state *s = state;
-    const drape_linear_ops *next = next_larger(s->ops->best_from);
+    /* The solver that is picked at the next larger sizes; NULL: none. */
+    const drape_linear_ops *next = NULL;
+    for (int i = 0; drape_linears[i]; i++)
+        if (drape_linears[i]->best_from > s->ops->best_from &&
+            (!next || drape_linears[i]->best_from < next->best_from))
+            next = drape_linears[i];
     *out = (drape_linear_report){.ops = s->ops};
     if (s->ops->report)
         s->ops->report(s->solver, out);

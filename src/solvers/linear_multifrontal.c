@@ -23,13 +23,6 @@ typedef struct multifrontal {
     factors have;
 } multifrontal;
 
-static void find_mirrored_blocks(const drape_pattern *p, int32_t *mirror)
-{
-    for (int32_t j = 0; j < p->block_count; j++)
-        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
-            *mirror++ = drape_pattern_find(p, j, p->block_row[k]);
-}
-
 static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
     multifrontal *s = drape_arena_take(arena, 1, sizeof *s);
@@ -47,7 +40,10 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
         drape_fronts_destroy(&s->fronts);
         return DRAPE_E_MEMORY;
     }
-    find_mirrored_blocks(pattern, s->mirror);
+    int32_t *mirror = s->mirror;
+    for (int32_t j = 0; j < pattern->block_count; j++)
+        for (int32_t k = pattern->diagonal[j]; k < pattern->block_start[j + 1]; k++)
+            *mirror++ = drape_pattern_find(pattern, j, pattern->block_row[k]);
     *state = s;
     return DRAPE_OK;
 }
@@ -86,10 +82,10 @@ static bool copy_diagonal(multifrontal *s, const double *values)
     return positive;
 }
 
-/* Visits the matrix column by column, as it is stored: in a well-numbered mesh a mirrored block is never
- * far from its block. */
-static properties inspect(multifrontal *s, const double *values)
+static drape_status factor_any(multifrontal *s, const double *values, bool definite)
 {
+    /* Visits the matrix column by column, as it is stored: in a well-numbered mesh a mirrored block is
+     * never far from its block. */
     const drape_pattern *p = s->fronts.pattern;
     const int32_t *mirror = s->mirror;
     properties of = {.finite = drape_all_finite(values, (size_t)p->nonzeros), .symmetric = true};
@@ -98,12 +94,6 @@ static properties inspect(multifrontal *s, const double *values)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
             of.symmetric &=
                 drape_pattern_is_mirrored(p, (double *)(uintptr_t)values, j, k, *mirror++, s->diagonal);
-    return of;
-}
-
-static drape_status factor_any(multifrontal *s, const double *values, bool definite)
-{
-    const properties of = inspect(s, values);
     drape_status status = DRAPE_RETRY_LINEAR;
     s->have = NONE;
     if (!of.finite)

@@ -281,31 +281,6 @@ static void spread_border(level *l)
     }
 }
 
-/* The rigid motions of nodes at x: translations, and rotations about their mean, in units of their extent. */
-static void make_modes(level *l, const double *x)
-{
-    const size_t count = (size_t)l->a.count;
-    const double all = (double)all_rows(l);
-    double mean[3] = {0}, extent = 0;
-    for (size_t i = 0; i < 3 * count; i++)
-        mean[i % 3] += x[i] / all;
-    if (l->border)
-        l->border->ranks->sum(l->border->ranks, mean, 3);
-    for (size_t i = 0; i < 3 * count; i++)
-        extent = fmax(extent, fabs(x[i] - mean[i % 3]));
-    extent = drape_ranks_largest(ranks_of(l), extent);
-    const double scale = extent > 0 ? 1 / extent : 0;
-    memset(l->modes, 0, 3 * count * MODES * sizeof *l->modes);
-    for (size_t i = 0; i < count; i++)
-        for (size_t c = 0; c < 3; c++) {
-            const size_t next = (c + 1) % 3, last = (c + 2) % 3;
-            double *block = l->modes + 3 * MODES * i;
-            block[MODES * c + c] = 1;
-            block[MODES * next + 3 + c] = -scale * (x[3 * i + last] - mean[last]);
-            block[MODES * last + 3 + c] = scale * (x[3 * i + next] - mean[next]);
-        }
-}
-
 static double dot_columns(const level *l, int32_t I, int p, int q)
 {
     double sum = 0;
@@ -638,7 +613,29 @@ static bool factor_levels(drape_multigrid *m)
 drape_status drape_multigrid_factor(drape_multigrid *m, const double *values, const double *x)
 {
     m->level[0].a.values = values;
-    make_modes(&m->level[0], x);
+    /* The rigid motions of nodes at x: translations, and rotations about their mean, in units of their
+     * extent. */
+    level *l = &m->level[0];
+    const size_t count = (size_t)l->a.count;
+    const double all = (double)all_rows(l);
+    double mean[3] = {0}, extent = 0;
+    for (size_t i = 0; i < 3 * count; i++)
+        mean[i % 3] += x[i] / all;
+    if (l->border)
+        l->border->ranks->sum(l->border->ranks, mean, 3);
+    for (size_t i = 0; i < 3 * count; i++)
+        extent = fmax(extent, fabs(x[i] - mean[i % 3]));
+    extent = drape_ranks_largest(ranks_of(l), extent);
+    const double scale = extent > 0 ? 1 / extent : 0;
+    memset(l->modes, 0, 3 * count * MODES * sizeof *l->modes);
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++) {
+            const size_t next = (c + 1) % 3, last = (c + 2) % 3;
+            double *block = l->modes + 3 * MODES * i;
+            block[MODES * c + c] = 1;
+            block[MODES * next + 3 + c] = -scale * (x[3 * i + last] - mean[last]);
+            block[MODES * last + 3 + c] = scale * (x[3 * i + next] - mean[next]);
+        }
     return factor_levels(m) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
@@ -712,21 +709,6 @@ LANES_INLINE void add_correction(const level *l, const int size, const double *c
 static void cycle(drape_multigrid *m, int k, const double *b, double *x);
 static void cycle_twice(drape_multigrid *m, int k);
 
-/* The cycles on the levels that each rank has as a whole. */
-static void cycle_whole(const gathered *whole, level *l)
-{
-    const drape_ranks *ranks = l->border->ranks;
-    const int32_t *first = l->border->first;
-    level *to = &whole->multigrid->level[0];
-    const size_t row = MODES * sizeof *l->b;
-    memcpy(to->b + MODES * (size_t)first[ranks->rank], l->b, row * (size_t)l->a.count);
-    ranks->share(ranks, to->b, first, row);
-    cycle_twice(whole->multigrid, 0);
-    memcpy(l->x, to->x + MODES * (size_t)first[ranks->rank], row * (size_t)l->a.count);
-    for (int32_t i = l->a.count; i < l->a.columns; i++)
-        memcpy(l->x + MODES * (size_t)i, to->x + MODES * (size_t)l->border->number[i - l->a.count], row);
-}
-
 /* Two cycles on level k for its own b. With s an eigenvalue of a cycle times A, at most 1, they are the
  * polynomial (1 - T(s)) / (1 + e) / s of the cycle, T that of Chebyshev of degree 2 with T(0) = 1 and
  * |T| <= e on [SMALLEST, 1]: symmetric, positive definite, and within 1 again (Axelsson & Vassilevski 1989,
@@ -735,9 +717,20 @@ static void cycle_twice(drape_multigrid *m, int k)
 {
     level *l = &m->level[k];
     if (k + 1 == m->count) {
-        if (m->whole.multigrid)
-            cycle_whole(&m->whole, l);
-        else
+        if (m->whole.multigrid) {
+            /* The cycles on the levels that each rank has as a whole. */
+            const drape_ranks *ranks = l->border->ranks;
+            const int32_t *first = l->border->first;
+            level *to = &m->whole.multigrid->level[0];
+            const size_t row = MODES * sizeof *l->b;
+            memcpy(to->b + MODES * (size_t)first[ranks->rank], l->b, row * (size_t)l->a.count);
+            ranks->share(ranks, to->b, first, row);
+            cycle_twice(m->whole.multigrid, 0);
+            memcpy(l->x, to->x + MODES * (size_t)first[ranks->rank], row * (size_t)l->a.count);
+            for (int32_t i = l->a.count; i < l->a.columns; i++)
+                memcpy(l->x + MODES * (size_t)i, to->x + MODES * (size_t)l->border->number[i - l->a.count],
+                       row);
+        } else
             cycle(m, k, l->b, l->x);
         return;
     }

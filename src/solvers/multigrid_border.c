@@ -215,29 +215,6 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The copies that the next level has: all aggregates of other ranks in these lists. Their numbers are NULL if
- * there is no memory here. */
-static void number_copies(drape_arena *arena, const level *l, const lists *p, const lists *reach, level *next)
-{
-    border *b = next->border;
-    const int32_t inside = l->p_start[l->a.columns], outside = reach->start[l->a.columns];
-    int32_t *number = drape_arena_take(arena, (size_t)inside + (size_t)outside, sizeof *number), count = 0,
-            unique = 0;
-    for (int list = 0; number && list < 2; list++)
-        for (int32_t q = 0; q < (list ? outside : inside); q++) {
-            const int32_t column = list ? reach->column[q] : p->column[q];
-            if (rank_of(b, column) != b->ranks->rank)
-                number[count++] = column;
-        }
-    if (number)
-        qsort(number, (size_t)count, sizeof *number, compare);
-    for (int32_t i = 0; i < count; i++)
-        if (i == 0 || number[i] != number[unique - 1])
-            number[unique++] = number[i];
-    b->number = number ? drape_arena_resize(arena, number, (size_t)unique, sizeof *number) : NULL;
-    next->a.columns = next->a.count + unique;
-}
-
 drape_status drape_border_prolong(drape_arena *arena, drape_arena *scratch, level *l, level *next,
                                   lists *reach)
 {
@@ -249,7 +226,25 @@ drape_status drape_border_prolong(drape_arena *arena, drape_arena *scratch, leve
         status = reach_of_copies(scratch, l, reach);
     if (status)
         return status;
-    number_copies(arena, l, &p, reach, next);
+    /* The copies that the next level has: all aggregates of other ranks in these lists. Their numbers are
+     * NULL if there is no memory here. */
+    border *b = next->border;
+    const int32_t inside = l->p_start[l->a.columns], outside = reach->start[l->a.columns];
+    int32_t *number = drape_arena_take(arena, (size_t)inside + (size_t)outside, sizeof *number), count = 0,
+            unique = 0;
+    for (int list = 0; number && list < 2; list++)
+        for (int32_t q = 0; q < (list ? outside : inside); q++) {
+            const int32_t column = list ? reach->column[q] : p.column[q];
+            if (rank_of(b, column) != b->ranks->rank)
+                number[count++] = column;
+        }
+    if (number)
+        qsort(number, (size_t)count, sizeof *number, compare);
+    for (int32_t i = 0; i < count; i++)
+        if (i == 0 || number[i] != number[unique - 1])
+            number[unique++] = number[i];
+    b->number = number ? drape_arena_resize(arena, number, (size_t)unique, sizeof *number) : NULL;
+    next->a.columns = next->a.count + unique;
     status = plan_rows(arena, scratch, next->border, &next->a);
     if (status)
         return status;
@@ -339,20 +334,6 @@ static void share_columns(const border *b, int32_t count, const int32_t *column,
     b->ranks->share(b->ranks, all, first, sizeof *all);
 }
 
-/* Sorts each row; place: where its columns were moved to. */
-static void sort_columns(matrix *a, const int32_t *column, int32_t *place)
-{
-    for (int32_t i = 0; i < a->count; i++)
-        for (int32_t k = a->start[i]; k < a->start[i + 1]; k++) {
-            place[k] = 0;
-            for (int32_t q = a->start[i]; q < a->start[i + 1]; q++)
-                place[k] += column[q] < column[k];
-            a->column[a->start[i] + place[k]] = column[k];
-            if (column[k] == i)
-                a->diagonal[i] = a->start[i] + place[k];
-        }
-}
-
 static drape_status gather_matrix(drape_arena *arena, drape_arena *scratch, const level *l, gathered *out)
 {
     const border *b = l->border;
@@ -370,20 +351,17 @@ static drape_status gather_matrix(drape_arena *arena, drape_arena *scratch, cons
     if (agree(b->ranks, arena, a->diagonal && column && out->place && out->shared))
         return DRAPE_E_MEMORY;
     share_columns(b, l->a.count, l->a.column, out->first_block, column);
-    sort_columns(a, column, out->place);
-    return DRAPE_OK;
-}
-
-/* Without weights, which have served. */
-static drape_status gather_graph(drape_arena *scratch, const level *l, graph *g)
-{
-    const border *b = l->border;
-    graph all = {.count = (int32_t)all_rows(l)};
-    int32_t *first = drape_arena_take(scratch, (size_t)b->ranks->count + 1, sizeof *first);
-    if (share_lengths(scratch, b, g->start, g->count, &all.start, first, &all.neighbor))
-        return DRAPE_E_MEMORY;
-    share_columns(b, g->count, g->neighbor, first, all.neighbor);
-    *g = all;
+    /* Sorts each row; place: where its columns were moved to. */
+    int32_t *place = out->place;
+    for (int32_t i = 0; i < a->count; i++)
+        for (int32_t k = a->start[i]; k < a->start[i + 1]; k++) {
+            place[k] = 0;
+            for (int32_t q = a->start[i]; q < a->start[i + 1]; q++)
+                place[k] += column[q] < column[k];
+            a->column[a->start[i] + place[k]] = column[k];
+            if (column[k] == i)
+                a->diagonal[i] = a->start[i] + place[k];
+        }
     return DRAPE_OK;
 }
 
@@ -394,5 +372,15 @@ drape_status drape_border_gather(drape_arena *arena, drape_arena *scratch, const
     if (agree(l->border->ranks, arena, out->multigrid))
         return DRAPE_E_MEMORY;
     const drape_status status = gather_matrix(arena, scratch, l, out);
-    return status ? status : gather_graph(scratch, l, g);
+    /* The graph without weights, which have served. */
+    if (status)
+        return status;
+    const border *b = l->border;
+    graph all = {.count = (int32_t)all_rows(l)};
+    int32_t *first = drape_arena_take(scratch, (size_t)b->ranks->count + 1, sizeof *first);
+    if (share_lengths(scratch, b, g->start, g->count, &all.start, first, &all.neighbor))
+        return DRAPE_E_MEMORY;
+    share_columns(b, g->count, g->neighbor, first, all.neighbor);
+    *g = all;
+    return DRAPE_OK;
 }

@@ -13,19 +13,6 @@
 
 /* ---- Aggregates ---- */
 
-/* mark (columns) is scratch. */
-static void count_shared(const matrix *a, graph *g, int32_t *mark)
-{
-    memset(mark, -1, (size_t)a->columns * sizeof *mark);
-    for (int32_t i = 0; i < g->count; i++) {
-        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
-            mark[g->neighbor[k]] = i;
-        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
-            for (int32_t q = a->start[g->neighbor[k]]; q < a->start[g->neighbor[k] + 1]; q++)
-                g->weight[k] += mark[a->column[q]] == i;
-    }
-}
-
 /* Drops the neighbours whose weight is below a share of the largest one of both rows: in a mesh the nodes
  * across an edge, which bending alone couples; in a grid of aggregates those at the corners. A smoothed
  * function of the next level reaches one coupling beyond its aggregate: between wide aggregates these
@@ -79,19 +66,6 @@ static int32_t form_aggregates(const graph *g, int32_t *aggregate, int32_t *join
             joined[i] = g->neighbor[k] < g->count ? aggregate[g->neighbor[k]] : -1;
     memcpy(aggregate, joined, (size_t)g->count * sizeof *joined);
     return count;
-}
-
-static void list_members(level *l)
-{
-    memset(l->member_start, 0, ((size_t)l->coarse + 2) * sizeof *l->member_start);
-    for (int32_t i = 0; i < l->a.count; i++)
-        if (l->aggregate[i] >= 0)
-            l->member_start[l->aggregate[i] + 2]++;
-    for (int32_t i = 0; i < l->coarse; i++)
-        l->member_start[i + 2] += l->member_start[i + 1];
-    for (int32_t i = 0; i < l->a.count; i++)
-        if (l->aggregate[i] >= 0)
-            l->member[l->member_start[l->aggregate[i] + 1]++] = i;
 }
 
 /* Aggregates are neighbours if rows in them are. Their matrix couples more of them, and aggregates of all
@@ -281,8 +255,17 @@ static drape_status aggregate(drape_arena *arena, drape_arena *scratch, level *l
     *made = all > 0 && all <= STAGNATION * (double)all_rows(l);
     l->coarse = *made ? l->coarse : 0;
     l->member_start = drape_arena_take(arena, (size_t)l->coarse + 2, sizeof *l->member_start);
-    if (l->member_start && *made)
-        list_members(l);
+    if (l->member_start && *made) {
+        memset(l->member_start, 0, ((size_t)l->coarse + 2) * sizeof *l->member_start);
+        for (int32_t i = 0; i < l->a.count; i++)
+            if (l->aggregate[i] >= 0)
+                l->member_start[l->aggregate[i] + 2]++;
+        for (int32_t i = 0; i < l->coarse; i++)
+            l->member_start[i + 2] += l->member_start[i + 1];
+        for (int32_t i = 0; i < l->a.count; i++)
+            if (l->aggregate[i] >= 0)
+                l->member[l->member_start[l->aggregate[i] + 1]++] = i;
+    }
     return agree(ranks_of(l), arena, l->member_start);
 }
 
@@ -333,28 +316,16 @@ static drape_status make_graph(drape_arena *scratch, const level *l, graph *out)
         return DRAPE_E_MEMORY;
     memcpy(out->start, a->start, (count + 1) * sizeof *out->start);
     memcpy(out->neighbor, a->column, entries * sizeof *out->neighbor);
-    count_shared(a, out, row);
+    memset(row, -1, (size_t)a->columns * sizeof *row);
+    for (int32_t i = 0; i < out->count; i++) {
+        for (int32_t k = out->start[i]; k < out->start[i + 1]; k++)
+            row[out->neighbor[k]] = i;
+        for (int32_t k = out->start[i]; k < out->start[i + 1]; k++)
+            for (int32_t q = a->start[out->neighbor[k]]; q < a->start[out->neighbor[k] + 1]; q++)
+                out->weight[k] += row[a->column[q]] == i;
+    }
     drop_distant(out, CLOSE_NODES, row, l->border);
     return DRAPE_OK;
-}
-
-/* Workspace of add_galerkin, and the dense matrix. */
-static drape_status take_shared(drape_arena *arena, drape_multigrid *m)
-{
-    size_t widest = 0, most = 0;
-    for (int k = 1; k < m->count; k++) {
-        const matrix *a = &m->level[k].a;
-        most = (size_t)a->columns > most ? (size_t)a->columns : most;
-        for (int32_t i = 0; i < a->count; i++)
-            widest = (size_t)length(a, i) > widest ? (size_t)length(a, i) : widest;
-    }
-    const size_t n = scalars(&m->level[m->count - 1].a);
-    m->product = drape_arena_take(arena, widest * MODES * MODES, sizeof *m->product);
-    m->hit = drape_arena_take(arena, widest, sizeof *m->hit);
-    m->where = drape_arena_take(arena, most, sizeof *m->where);
-    if (m->level[m->count - 1].a.count <= DENSE && !m->level[0].border)
-        m->dense = drape_arena_take(arena, n * n, sizeof *m->dense);
-    return drape_arena_status(arena);
 }
 
 static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape_multigrid *m, graph *g);
@@ -392,7 +363,21 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
         if (agree(ranks_of(l), arena, !status))
             return DRAPE_E_MEMORY;
     }
-    return take_shared(arena, m);
+    /* Workspace of add_galerkin, and the dense matrix. */
+    size_t widest = 0, most = 0;
+    for (int k = 1; k < m->count; k++) {
+        const matrix *a = &m->level[k].a;
+        most = (size_t)a->columns > most ? (size_t)a->columns : most;
+        for (int32_t i = 0; i < a->count; i++)
+            widest = (size_t)length(a, i) > widest ? (size_t)length(a, i) : widest;
+    }
+    const size_t n = scalars(&m->level[m->count - 1].a);
+    m->product = drape_arena_take(arena, widest * MODES * MODES, sizeof *m->product);
+    m->hit = drape_arena_take(arena, widest, sizeof *m->hit);
+    m->where = drape_arena_take(arena, most, sizeof *m->where);
+    if (m->level[m->count - 1].a.count <= DENSE && !m->level[0].border)
+        m->dense = drape_arena_take(arena, n * n, sizeof *m->dense);
+    return drape_arena_status(arena);
 }
 
 drape_status drape_multigrid_create(drape_arena *arena, const drape_pattern *pattern, drape_multigrid **out)

@@ -24,30 +24,6 @@ static double dot(const drape_pcg *s, const double *a, const double *b)
     return drape_ranks_sum(s->ranks, sum);
 }
 
-/* A direction without positive curvature. Before the first step x becomes the preconditioned residual
- * itself, which is a descent direction. */
-static void stop_indefinite(drape_pcg *s, double *x)
-{
-    s->definite = false;
-    if (s->iterations == 0)
-        memcpy(x, s->p, (size_t)s->n * sizeof *x);
-}
-
-static void advance(drape_pcg *s, double a, double *x)
-{
-    for (int64_t i = 0; i < s->n; i++) {
-        x[i] += a * s->p[i];
-        s->r[i] -= a * s->q[i];
-    }
-    s->iterations++;
-}
-
-static void turn(drape_pcg *s, double b)
-{
-    for (int64_t i = 0; i < s->n; i++)
-        s->p[i] = s->z[i] + b * s->p[i];
-}
-
 void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance, int max_iterations)
 {
     size_t bytes = (size_t)s->n * sizeof *x;
@@ -63,16 +39,27 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
         s->multiply(s->owner, s->p, s->q);
         double curvature = dot(s, s->p, s->q);
         if (!(curvature > 0)) {
-            stop_indefinite(s, x);
+            /* A direction without positive curvature. Before the first step x becomes the preconditioned
+             * residual itself, which is a descent direction. */
+            s->definite = false;
+            if (s->iterations == 0)
+                memcpy(x, s->p, (size_t)s->n * sizeof *x);
             return;
         }
-        advance(s, size / curvature, x);
+        const double a = size / curvature;
+        for (int64_t i = 0; i < s->n; i++) {
+            x[i] += a * s->p[i];
+            s->r[i] -= a * s->q[i];
+        }
+        s->iterations++;
         if (s->iterations == max_iterations)
             return;
         s->precondition(s->owner, s->r, s->z);
         double before = size;
         size = dot(s, s->r, s->z);
         s->converged = size <= goal;
-        turn(s, size / before);
+        const double beta = size / before;
+        for (int64_t i = 0; i < s->n; i++)
+            s->p[i] = s->z[i] + beta * s->p[i];
     }
 }

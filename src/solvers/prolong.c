@@ -90,17 +90,6 @@ static void add_row(table *to, int32_t node, const table *from, int32_t other, d
     }
 }
 
-static void smooth(const drape_graph *g, const table *from, table *to)
-{
-    for (int32_t i = 0; i < g->count; i++) {
-        int32_t degree = g->start[i + 1] - g->start[i];
-        to->count[i] = 0;
-        add_row(to, i, from, i, degree ? 1 - SMOOTH : 1);
-        for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
-            add_row(to, i, from, g->neighbor[k], SMOOTH / degree);
-    }
-}
-
 static double threshold(const table *t, int32_t node)
 {
     double largest = 0;
@@ -158,7 +147,15 @@ static void make_functions(const drape_graph *g, int spacing, const front *f, ta
     }
     int steps = spacing > 3 ? spacing - 2 : 1;
     for (int s = 0; s < steps; s++) {
-        smooth(g, &t[0], &t[1]);
+        const table *from = &t[0];
+        table *to = &t[1];
+        for (int32_t i = 0; i < g->count; i++) {
+            int32_t degree = g->start[i + 1] - g->start[i];
+            to->count[i] = 0;
+            add_row(to, i, from, i, degree ? 1 - SMOOTH : 1);
+            for (int32_t k = g->start[i]; k < g->start[i + 1]; k++)
+                add_row(to, i, from, g->neighbor[k], SMOOTH / degree);
+        }
         table swap = t[0];
         t[0] = t[1];
         t[1] = swap;
@@ -212,24 +209,6 @@ void drape_prolong_add(const drape_prolong *p, const double *coarse, double *fin
 
 /* ---- Coupled functions ---- */
 
-/* The nodes at which each coarse function is nonzero: node[start[a]] ... node[start[a + 1] - 1]. */
-static bool transpose(drape_arena *arena, const drape_prolong *p, int32_t **start, int32_t **node)
-{
-    size_t total = (size_t)p->start[p->fine];
-    *start = drape_arena_take(arena, (size_t)p->coarse + 2, sizeof **start);
-    *node = drape_arena_take(arena, total, sizeof **node);
-    if (drape_arena_status(arena))
-        return false;
-    for (size_t k = 0; k < total; k++)
-        (*start)[p->column[k] + 2]++;
-    for (int32_t a = 1; a < p->coarse; a++)
-        (*start)[a + 1] += (*start)[a];
-    for (int32_t i = 0; i < p->fine; i++)
-        for (int32_t k = p->start[i]; k < p->start[i + 1]; k++)
-            (*node)[(*start)[p->column[k] + 1]++] = i;
-    return true;
-}
-
 /* The functions at one node that function a has not been coupled to yet (mark[b] != a), and marks them. to
  * NULL: only counts them. */
 static int32_t meet_at(const drape_prolong *p, int32_t node, int32_t a, int32_t *mark, int32_t *to)
@@ -271,8 +250,19 @@ drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *p, cons
 {
     int32_t *start, *node, *mark = drape_arena_take(arena, (size_t)p->coarse, sizeof *mark);
     int32_t *rows = drape_arena_take(arena, (size_t)p->coarse + 1, sizeof *rows);
-    if (!transpose(arena, p, &start, &node))
+    /* The nodes at which each coarse function is nonzero: node[start[a]] ... node[start[a + 1] - 1]. */
+    size_t total = (size_t)p->start[p->fine];
+    start = drape_arena_take(arena, (size_t)p->coarse + 2, sizeof *start);
+    node = drape_arena_take(arena, total, sizeof *node);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
+    for (size_t k = 0; k < total; k++)
+        start[p->column[k] + 2]++;
+    for (int32_t a = 1; a < p->coarse; a++)
+        start[a + 1] += start[a];
+    for (int32_t i = 0; i < p->fine; i++)
+        for (int32_t k = p->start[i]; k < p->start[i + 1]; k++)
+            node[start[p->column[k] + 1]++] = i;
     unmark(mark, p->coarse);
     for (int32_t a = 0; a < p->coarse; a++)
         rows[a + 1] = rows[a] + meet_row(p, g, start, node, a, mark, NULL);

@@ -13,13 +13,6 @@
 
 #include <ida/ida_impl.h>
 
-static void archive_long(drape_archive *a, long *value)
-{
-    int64_t copy = *value;
-    drape_archive_int64(a, &copy);
-    *value = (long)copy;
-}
-
 static void archive_vector(drape_archive *a, N_Vector v)
 {
     drape_archive_doubles(a, N_VGetArrayPointer(v), (size_t)N_VGetLength(v));
@@ -39,45 +32,6 @@ void drape_ida_clear(void *ida)
     N_VConst(0, s->ida_ee);
 }
 
-/* The history itself: scaled divided differences, and the steps that they belong to. */
-static void archive_history(IDAMem s, drape_archive *a)
-{
-    drape_archive_same(a, "IDA's largest order", s->ida_maxord_alloc);
-    for (int k = 0; k <= last_column(s); k++)
-        archive_vector(a, s->ida_phi[k]);
-    archive_vector(a, s->ida_ee);
-    double *const arrays[] = {s->ida_psi, s->ida_alpha, s->ida_beta, s->ida_sigma, s->ida_gamma};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        drape_archive_doubles(a, arrays[i], MXORDP1);
-}
-
-static void archive_steps(IDAMem s, drape_archive *a)
-{
-    int *const integers[] = {&s->ida_tstopset, &s->ida_kk, &s->ida_kused,    &s->ida_knew,
-                             &s->ida_phase,    &s->ida_ns, &s->ida_SetupDone};
-    for (size_t i = 0; i < sizeof integers / sizeof *integers; i++)
-        drape_archive_int(a, integers[i]);
-    double *const numbers[] = {
-        &s->ida_tstop, &s->ida_hin,      &s->ida_h0u,     &s->ida_hh,     &s->ida_hused, &s->ida_eta,
-        &s->ida_tn,    &s->ida_tretlast, &s->ida_cj,      &s->ida_cjlast, &s->ida_cjold, &s->ida_cjratio,
-        &s->ida_ss,    &s->ida_oldnrm,   &s->ida_epsNewt, &s->ida_toldel, &s->ida_tolsf};
-    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
-        drape_archive_double(a, numbers[i]);
-    long *const counts[] = {&s->ida_nst, &s->ida_nre, &s->ida_ncfn,   &s->ida_netf,
-                            &s->ida_nni, &s->ida_nnf, &s->ida_nsetups};
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        archive_long(a, counts[i]);
-}
-
-/* Orders are indices into the history. */
-static void check_orders(const struct IDAMemRec *s, drape_archive *a)
-{
-    const int most = s->ida_maxord, orders[] = {s->ida_kk, s->ida_kused, s->ida_knew};
-    for (int i = 0; i < 3 && drape_archive_good(a); i++)
-        if (orders[i] < 0 || orders[i] > most)
-            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has the order %d of %d", orders[i], most);
-}
-
 /* Does what only the first IDASolve does, before its first step. False if it fails. */
 static bool set_up(IDAMem s)
 {
@@ -90,9 +44,37 @@ bool drape_ida_archive(void *ida, drape_archive *a)
 {
     IDAMem s = ida;
     drape_archive_mark(a, "ida");
-    archive_history(s, a);
-    archive_steps(s, a);
-    check_orders(s, a);
+    /* The history itself: scaled divided differences, and the steps that they belong to. */
+    drape_archive_same(a, "IDA's largest order", s->ida_maxord_alloc);
+    for (int k = 0; k <= last_column(s); k++)
+        archive_vector(a, s->ida_phi[k]);
+    archive_vector(a, s->ida_ee);
+    double *const arrays[] = {s->ida_psi, s->ida_alpha, s->ida_beta, s->ida_sigma, s->ida_gamma};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        drape_archive_doubles(a, arrays[i], MXORDP1);
+    int *const integers[] = {&s->ida_tstopset, &s->ida_kk, &s->ida_kused,    &s->ida_knew,
+                             &s->ida_phase,    &s->ida_ns, &s->ida_SetupDone};
+    for (size_t i = 0; i < sizeof integers / sizeof *integers; i++)
+        drape_archive_int(a, integers[i]);
+    double *const numbers[] = {
+        &s->ida_tstop, &s->ida_hin,      &s->ida_h0u,     &s->ida_hh,     &s->ida_hused, &s->ida_eta,
+        &s->ida_tn,    &s->ida_tretlast, &s->ida_cj,      &s->ida_cjlast, &s->ida_cjold, &s->ida_cjratio,
+        &s->ida_ss,    &s->ida_oldnrm,   &s->ida_epsNewt, &s->ida_toldel, &s->ida_tolsf};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    long *const counts[] = {&s->ida_nst, &s->ida_nre, &s->ida_ncfn,   &s->ida_netf,
+                            &s->ida_nni, &s->ida_nnf, &s->ida_nsetups};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        long *value = counts[i];
+        int64_t copy = *value;
+        drape_archive_int64(a, &copy);
+        *value = (long)copy;
+    }
+    /* Orders are indices into the history. */
+    const int most = s->ida_maxord, orders[] = {s->ida_kk, s->ida_kused, s->ida_knew};
+    for (int i = 0; i < 3 && drape_archive_good(a); i++)
+        if (orders[i] < 0 || orders[i] > most)
+            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has the order %d of %d", orders[i], most);
     if (drape_archive_has_read(a) && s->ida_SetupDone && !set_up(s))
         drape_archive_fail(a, DRAPE_E_SOLVER, "IDA cannot continue from the checkpoint");
     return true;

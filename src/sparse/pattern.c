@@ -101,23 +101,6 @@ static drape_status allocate(drape_arena *arena, drape_pattern *pattern, int32_t
     return drape_arena_status(arena);
 }
 
-static void fill_blocks(drape_pattern *pattern, const neighbours *list)
-{
-    for (int32_t j = 0; j < pattern->block_count; j++) {
-        int32_t first = pattern->block_start[j], length = (int32_t)list->next[j];
-        pattern->block_start[j + 1] = first + length;
-        memcpy(pattern->block_row + first, list->row + list->start[j], (size_t)length * sizeof *list->row);
-        pattern->diagonal[j] = drape_pattern_find(pattern, j, j);
-    }
-}
-
-static void fill_columns(drape_pattern *pattern)
-{
-    for (int64_t j = 0; j < pattern->n; j++)
-        pattern->column[j + 1] =
-            pattern->column[j] + 3 * (int64_t)(pattern->block_start[j / 3 + 1] - pattern->block_start[j / 3]);
-}
-
 drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern)
 {
@@ -132,8 +115,15 @@ drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const 
     if (!status)
         status = allocate(arena, pattern, block_count, blocks);
     if (!status) {
-        fill_blocks(pattern, &list);
-        fill_columns(pattern);
+        for (int32_t j = 0; j < pattern->block_count; j++) {
+            int32_t first = pattern->block_start[j], length = (int32_t)list.next[j];
+            pattern->block_start[j + 1] = first + length;
+            memcpy(pattern->block_row + first, list.row + list.start[j], (size_t)length * sizeof *list.row);
+            pattern->diagonal[j] = drape_pattern_find(pattern, j, j);
+        }
+        for (int64_t j = 0; j < pattern->n; j++)
+            pattern->column[j + 1] = pattern->column[j] + 3 * (int64_t)(pattern->block_start[j / 3 + 1] -
+                                                                        pattern->block_start[j / 3]);
     }
     drape_arena_free(&scratch);
     return status;
