@@ -6,8 +6,8 @@
 #ifndef DRAPE_CONTACT_BROAD_PHASE_H
 #define DRAPE_CONTACT_BROAD_PHASE_H
 
+#include "contact/clusters.h"
 #include "contact/distant.h"
-#include "contact/elements_of.h"
 #include "contact/pair.h"
 #include "contact/self_search.h"
 #include "geometry/path_bvh.h"

@@ -5,6 +5,7 @@
 #ifndef DRAPE_CONTACT_CLUSTERS_H
 #define DRAPE_CONTACT_CLUSTERS_H
 
+#include "base/arena.h"
 #include "base/lanes.h"
 #include "model/model.h"
 
@@ -72,5 +73,18 @@ static inline int drape_element_nodes(const drape_model *m, drape_element_kind k
                                          : m->triangle + 3 * (size_t)*element;
     return kind == DRAPE_ELEMENT_NODE ? 1 : kind == DRAPE_ELEMENT_EDGE ? 2 : 3;
 }
+
+/* The elements, edges or faces, that have each point. */
+typedef struct drape_elements_of {
+    int32_t *first;   /* (points + 1) where those of a point begin */
+    int32_t *element; /* in rising order */
+} drape_elements_of;
+
+/* Takes memory for as many elements of this size, and lists those in `point` (count x size). */
+drape_status drape_elements_of_create(drape_arena *arena, int32_t count, int size, const int32_t *point,
+                                      int32_t points, drape_elements_of *out);
+
+/* The edge, of (edges x 2), between two points; -1: none. */
+int32_t drape_elements_of_edge(const drape_elements_of *edges, const int32_t *edge, int32_t a, int32_t b);
 
 #endif

@@ -26,11 +26,4 @@ typedef struct drape_gap_derivatives {
     double ddm[DRAPE_GAP_DOFS][DRAPE_GAP_DOFS]; /* of the mollifier, if there is one */
 } drape_gap_derivatives;
 
-/* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -
- * q/w) below w, 1 above. Sets mollified, m and dm. */
-void drape_mollify(double x[4][3], double w, drape_gap *gap);
-
-/* Its second derivative, below w. */
-void drape_mollify_twice(double x[4][3], double w, double ddm[DRAPE_GAP_DOFS][DRAPE_GAP_DOFS]);
-
 #endif

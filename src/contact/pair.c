@@ -2,6 +2,7 @@
 #include "contact/pair.h"
 
 #include "base/vec3.h"
+#include "contact/gap.h"
 
 #include <math.h>
 #include <string.h>
@@ -18,6 +19,74 @@ static find_closest *const finders[] = {NULL, drape_closest_point_triangle, drap
 int drape_pair_points(const drape_pair *pair)
 {
     return finders[pair->kind] ? 4 : 1;
+}
+
+#define D DRAPE_GAP_DOFS
+
+/* q = |u|^2 |w|^2 - (u.w)^2 with u = x1 - x0, w = x3 - x2, and its derivatives by u and w. */
+typedef struct cross_square {
+    double q, du[3], dw[3], uu[3][3], uw[3][3], ww[3][3];
+} cross_square;
+
+static cross_square cross_square_of(double x[4][3])
+{
+    double u[3], w[3], c[3];
+    cross_square s;
+    vec3_sub(x[1], x[0], u);
+    vec3_sub(x[3], x[2], w);
+    double a = vec3_dot(u, u), e = vec3_dot(w, w), b = vec3_dot(u, w);
+    vec3_cross(u, w, c);
+    s.q = vec3_dot(c, c);
+    for (int i = 0; i < 3; i++) {
+        s.du[i] = 2 * (e * u[i] - b * w[i]);
+        s.dw[i] = 2 * (a * w[i] - b * u[i]);
+        for (int j = 0; j < 3; j++) {
+            s.uu[i][j] = 2 * ((i == j ? e : 0) - w[i] * w[j]);
+            s.ww[i][j] = 2 * ((i == j ? a : 0) - u[i] * u[j]);
+            s.uw[i][j] = 2 * (2 * u[i] * w[j] - w[i] * u[j] - (i == j ? b : 0));
+        }
+    }
+    return s;
+}
+
+static double sign_of(int point)
+{
+    return point % 2 ? 1 : -1; /* u = x1 - x0, w = x3 - x2 */
+}
+
+static double dq_of(const cross_square *s, int i)
+{
+    int p = i / 3, k = i % 3;
+    return sign_of(p) * (p < 2 ? s->du[k] : s->dw[k]);
+}
+
+static double ddq_of(const cross_square *s, int i, int j)
+{
+    int p = i / 3, k = i % 3, r = j / 3, l = j % 3;
+    double h = p < 2 ? (r < 2 ? s->uu[k][l] : s->uw[k][l]) : (r < 2 ? s->uw[l][k] : s->ww[k][l]);
+    return sign_of(p) * sign_of(r) * h;
+}
+
+/* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -
+ * q/w) below w, 1 above. Sets mollified, m and dm. */
+static void mollify(double x[4][3], double w, drape_gap *gap)
+{
+    const cross_square s = cross_square_of(x);
+    const double y = s.q / w;
+    gap->mollified = s.q < w;
+    gap->m = gap->mollified ? y * (2 - y) : 1;
+    for (int i = 0; gap->mollified && i < D; i++)
+        gap->dm[i] = 2 * (1 - y) / w * dq_of(&s, i);
+}
+
+/* The second derivative of the mollifier, below w. */
+static void mollify_twice(double x[4][3], double w, double ddm[D][D])
+{
+    const cross_square s = cross_square_of(x);
+    const double dmdq = 2 * (1 - s.q / w) / w, ddmdq = -2 / (w * w);
+    for (int i = 0; i < D; i++)
+        for (int j = 0; j < D; j++)
+            ddm[i][j] = dmdq * ddq_of(&s, i, j) + ddmdq * dq_of(&s, i) * dq_of(&s, j);
 }
 
 static void gather(const drape_pair *pair, int points, const double *from, double local[4][3])
@@ -44,7 +113,7 @@ double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *a
     return closest.distance - pair->radius;
 }
 
-/* w of drape_mollify, from the edges at rest. */
+/* w of mollify, from the edges at rest. */
 static double mollifier_width(const drape_pair *pair, const double *rest)
 {
     double x[4][3], u[3], w[3];
@@ -174,7 +243,7 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
     if (gap->fixed_normal)
         touching_normal(pair, at, x, gap->closest.normal);
     if (pair->kind == DRAPE_PAIR_SEGMENTS)
-        drape_mollify(x, mollifier_width(pair, rest), gap);
+        mollify(x, mollifier_width(pair, rest), gap);
     return true;
 }
 
@@ -193,7 +262,7 @@ void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const 
     if (!gap->fixed_normal)
         drape_closest_derive(x, &gap->closest, &derivatives->closest);
     if (gap->mollified)
-        drape_mollify_twice(x, mollifier_width(pair, rest), derivatives->ddm);
+        mollify_twice(x, mollifier_width(pair, rest), derivatives->ddm);
 }
 
 /* ---- Continuous collision detection ---- */

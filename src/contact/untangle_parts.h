@@ -1,8 +1,8 @@
 /*
- * untangle_parts.h: what the files of untangle.h share. untangle.c: the sweeps; untangle_contours.c: where
- * sheets pass through each other, and which part of them is on the wrong side; untangle_bodies.c: what is
- * inside closed colliders; untangle_gaps.c: pairs that are apart and stay so; untangle_project.c: the
- * positions that satisfy all of these with the least distortion.
+ * untangle_parts.h: what the files of untangle.h share. untangle.c: the sweeps, and the positions that satisfy
+ * all bounds with the least distortion; untangle_contours.c: where sheets pass through each other, and which
+ * part of them is on the wrong side; untangle_bodies.c: what is inside closed colliders; untangle_gaps.c: pairs
+ * that are apart and stay so.
  */
 #ifndef DRAPE_CONTACT_UNTANGLE_PARTS_H
 #define DRAPE_CONTACT_UNTANGLE_PARTS_H
@@ -135,8 +135,5 @@ drape_status drape_untangle_bodies(drape_untangler *u);
 
 /* Adds bounds for pairs that are near each other, except where they pass through, and measures their gaps. */
 drape_status drape_untangle_gaps(drape_untangler *u);
-
-/* Moves x to where bounds, lengths and bends are kept as well as possible. */
-void drape_untangle_project(drape_untangler *u);
 
 #endif

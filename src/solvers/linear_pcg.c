@@ -5,10 +5,10 @@
  * tolerance.
  *
  * A matrix that is not symmetric, or not positive definite, which the iteration notices at the latest, goes
- * to the fallback (fallback.h), unless it is too large for that in one process.
+ * to the fallback (the direct solver `multifrontal`), unless it is too large for that in one process.
  */
 #include "base/finite.h"
-#include "solvers/fallback.h"
+#include "solvers/linear.h"
 #include "solvers/multigrid.h"
 #include "solvers/pcg.h"
 #include "solvers/rounding.h"
@@ -17,6 +17,100 @@
 #include <string.h>
 
 #define MAX_ITERATIONS 2000 /* a matrix that needs more goes to the fallback */
+
+/* ---- The fallback ---- */
+
+/* The direct solver `multifrontal`, or that of the ranks that share the matrix, gets the matrices that cannot
+ * be solved here, unchanged. It is created for the first such matrix, because most scenes have none. */
+
+typedef struct fallback {
+    const drape_linear_ops *ops;
+    const drape_pattern *pattern;
+    drape_arena arena; /* holds the solver */
+    void *solver;      /* NULL before the first such matrix */
+    drape_pool *pool;  /* of the solver, as in drape_linear_ops, and its flag */
+    const atomic_bool *const *cancel;
+    bool active;   /* the last matrix was factored here */
+    int64_t count; /* matrices passed to it */
+} fallback;
+
+extern const drape_linear_ops drape_linear_multifrontal;
+
+/* The arena must stay at its address. Takes no memory. */
+static fallback fallback_of(drape_arena *arena, const drape_pattern *pattern)
+{
+    return (fallback){.ops = pattern->ranks ? pattern->ranks->direct : &drape_linear_multifrontal,
+                      .pattern = pattern,
+                      .arena = drape_arena_within(arena)};
+}
+
+static void fallback_destroy(fallback *f)
+{
+    drape_linear_destroy(f->ops, &f->solver);
+    drape_arena_free(&f->arena);
+}
+
+static void fallback_use_threads(fallback *f, drape_pool *pool)
+{
+    f->pool = pool;
+    if (f->solver && f->ops->use_threads)
+        f->ops->use_threads(f->solver, pool);
+}
+
+static void fallback_watch(fallback *f, const atomic_bool *const *cancel)
+{
+    f->cancel = cancel;
+    if (f->solver && f->ops->watch)
+        f->ops->watch(f->solver, cancel);
+}
+
+static drape_status create_fallback(fallback *f)
+{
+    drape_status status = f->ops->create(&f->arena, f->pattern, &f->solver);
+    if (status) {
+        fallback_destroy(f);
+        return status;
+    }
+    fallback_use_threads(f, f->pool);
+    fallback_watch(f, f->cancel);
+    return status;
+}
+
+/* Errors: those of the solver's create and factor; after one it is not active, and may be called again. */
+static drape_status fallback_factor(fallback *f, const double *values)
+{
+    f->count++;
+    drape_status status = f->solver ? DRAPE_OK : create_fallback(f);
+    if (!status)
+        status = f->ops->factor(f->solver, values);
+    f->active = !status;
+    return status;
+}
+
+/* Archives the state of the solver and the owner's *factored; values as in drape_linear_ops.archive. */
+static void fallback_archive(fallback *f, bool *factored, drape_archive *a, const double *values)
+{
+    bool there = f->solver != NULL;
+    drape_archive_int64(a, &f->count);
+    drape_archive_bool(a, &f->active);
+    drape_archive_bool(a, factored);
+    drape_archive_bool(a, &there);
+    if (drape_archive_has_read(a) && there && !f->solver)
+        drape_archive_note(a, create_fallback(f));
+    if (drape_archive_good(a) && there)
+        drape_linear_archive(f->ops, f->solver, a, f->active ? values : NULL);
+}
+
+/* The owner's report; the bytes that libraries took. */
+static drape_linear_report fallback_report(const fallback *f, const drape_linear_ops *owner)
+{
+    return (drape_linear_report){.ops = owner, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
+}
+
+static size_t fallback_bytes(const fallback *f)
+{
+    return f->solver ? drape_linear_bytes(f->ops, f->solver) : 0;
+}
 
 extern const drape_linear_ops drape_linear_pcg;
 
@@ -28,7 +122,7 @@ typedef struct pcg_state {
     double *diagonal;     /* (n) entries of the matrix */
     drape_multigrid *multigrid;
     drape_pcg pcg;
-    drape_fallback fallback;
+    fallback fallback;
     bool factored; /* by this solver or by the fallback */
     bool definite; /* a symmetric matrix that turns out not to be positive definite is refused */
 } pcg_state;
@@ -51,7 +145,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->pattern = pattern;
-    s->fallback = drape_fallback_of(arena, pattern);
+    s->fallback = fallback_of(arena, pattern);
     s->positions = drape_arena_take(arena, n, sizeof *s->positions);
     s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
     s->pcg = drape_pcg_of(arena, drape_pattern_own(pattern), s, multiply, precondition);
@@ -66,7 +160,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 
 static void destroy(void **state)
 {
-    drape_fallback_destroy(&((pcg_state *)*state)->fallback);
+    fallback_destroy(&((pcg_state *)*state)->fallback);
 }
 
 /* ---- Values ---- */
@@ -87,19 +181,19 @@ static drape_status factor_general(pcg_state *s)
                   s->pattern->n, DRAPE_MOST_FACTORED);
         return DRAPE_RETRY_LINEAR;
     }
-    drape_status status = drape_fallback_factor(&s->fallback, s->values);
+    drape_status status = fallback_factor(&s->fallback, s->values);
     s->factored = !status;
     return status;
 }
 
 static void use_threads(void *state, drape_pool *pool)
 {
-    drape_fallback_use_threads(&((pcg_state *)state)->fallback, pool);
+    fallback_use_threads(&((pcg_state *)state)->fallback, pool);
 }
 
 static void watch(void *state, const atomic_bool *const *cancel)
 {
-    drape_fallback_watch(&((pcg_state *)state)->fallback, cancel);
+    fallback_watch(&((pcg_state *)state)->fallback, cancel);
 }
 
 static void set_positions(void *state, const double *x)
@@ -160,7 +254,7 @@ static drape_status solve(void *state, const double *b, double *x)
 static void archive(void *state, drape_archive *a, const double *values)
 {
     pcg_state *s = state;
-    drape_fallback_archive(&s->fallback, &s->factored, a, values);
+    fallback_archive(&s->fallback, &s->factored, a, values);
     drape_archive_bool(a, &s->definite);
     if (!values)
         return;
@@ -174,12 +268,12 @@ static void archive(void *state, drape_archive *a, const double *values)
 
 static size_t bytes(const void *state)
 {
-    return drape_fallback_bytes(&((const pcg_state *)state)->fallback);
+    return fallback_bytes(&((const pcg_state *)state)->fallback);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
-    *out = drape_fallback_report(&((const pcg_state *)state)->fallback, &drape_linear_pcg);
+    *out = fallback_report(&((const pcg_state *)state)->fallback, &drape_linear_pcg);
 }
 
 const drape_linear_ops drape_linear_pcg = {
