@@ -421,31 +421,6 @@ static void carry_wind(const drape_term *term, const double *gradient, const dou
         }
 }
 
-/* Adds r dT/dv - dT/dx of one element to its force, and the derivatives by x and v to dg_dx and dg_dv (d x
- * d), unless they are NULL. In a step w = r: what r T_vx - w T_xv adds is antisymmetric, and the positive
- * semidefinite part is w r T_vv. */
-static void add_kinetic(const drape_term *term, const drape_elements *el, const drape_request *want,
-                        const double *v, int32_t element, double *g, double *dg_dx, double *dg_dv)
-{
-    const int d = 3 * el->nodes;
-    const drape_point *point = want->point;
-    const double r = point->momentum, exact = 1 - want->positive_share;
-    double by_x[D], by_v[D], xx[D * D], vx[D * D], vv[D * D];
-    term->ops->kinetic(el, element, 1, point->x, v,
-                       &(drape_kinetic){.by_x = by_x,
-                                        .by_v = by_v,
-                                        .xx = dg_dx ? xx : NULL,
-                                        .vx = dg_dx ? vx : NULL,
-                                        .vv = dg_dx ? vv : NULL});
-    for (int i = 0; i < d; i++)
-        g[i] += r * by_v[i] - by_x[i];
-    for (int i = 0; dg_dx && i < d; i++)
-        for (int j = 0; j < d; j++) {
-            dg_dx[d * i + j] += r * vx[d * i + j] - exact * xx[d * i + j];
-            dg_dv[d * i + j] += r * vv[d * i + j] - vx[d * j + i];
-        }
-}
-
 /* The force of the dissipation, if that is wanted, else 0. */
 static void evaluate_drag(const drape_term *term, const drape_elements *el, const drape_request *want,
                           const double *v, drape_block *b)
@@ -471,8 +446,29 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
     evaluate_drag(term, &el, want, v, b);
     for (int32_t i = 0; term->ops->kinetic && want->conservative && i < b->count; i++) {
         const size_t at = (size_t)i * (size_t)(d * d);
-        add_kinetic(term, &el, want, v, b->first + i, b->gradient + (size_t)i * (size_t)d,
-                    hessian ? b->hessian + at : NULL, hessian ? b->scratch + at : NULL);
+        /* Adds r dT/dv - dT/dx of one element to its force, and the derivatives by x and v to dg_dx and
+         * dg_dv (d x d), unless they are NULL. In a step w = r: what r T_vx - w T_xv adds is
+         * antisymmetric, and the positive semidefinite part is w r T_vv. */
+        const int32_t element = b->first + i;
+        double *g = b->gradient + (size_t)i * (size_t)d;
+        double *dg_dx = hessian ? b->hessian + at : NULL;
+        double *dg_dv = hessian ? b->scratch + at : NULL;
+        const drape_point *point = want->point;
+        const double r = point->momentum, exact = 1 - want->positive_share;
+        double by_x[D], by_v[D], xx[D * D], vx[D * D], vv[D * D];
+        term->ops->kinetic(&el, element, 1, point->x, v,
+                           &(drape_kinetic){.by_x = by_x,
+                                            .by_v = by_v,
+                                            .xx = dg_dx ? xx : NULL,
+                                            .vx = dg_dx ? vx : NULL,
+                                            .vv = dg_dx ? vv : NULL});
+        for (int k = 0; k < d; k++)
+            g[k] += r * by_v[k] - by_x[k];
+        for (int k = 0; dg_dx && k < d; k++)
+            for (int j = 0; j < d; j++) {
+                dg_dx[d * k + j] += r * vx[d * k + j] - exact * xx[d * k + j];
+                dg_dv[d * k + j] += r * vv[d * k + j] - vx[d * j + k];
+            }
     }
     for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
         carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,

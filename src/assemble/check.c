@@ -311,13 +311,14 @@ static void check_elements(checker *c, const drape_term *term)
     for (c->progress = drape_term_is_timed(term) ? 0 : 1; c->progress <= 1; c->progress += 0.5) {
         /* The smallest scales of an element's errors: MIN_SCALE of the term's largest derivatives, over
          * every stride-th element. */
+        errors size = {0};
         for (int32_t e = 0; e < term->elements.count; e += stride) {
             local here;
             evaluate(c, term, e, &here);
-            max = largest_of(max, size_of(c, term, &here));
+            size = largest_of(size, size_of(c, term, &here));
         }
-        const errors min = {MIN_SCALE * max.gradient, MIN_SCALE * max.hessian, MIN_SCALE * max.velocity,
-                            MIN_SCALE * max.symmetry};
+        const errors min = {MIN_SCALE * size.gradient, MIN_SCALE * size.hessian, MIN_SCALE * size.velocity,
+                            MIN_SCALE * size.symmetry};
         for (int32_t e = 0; e < term->elements.count; e += stride)
             max = largest_of(max, compare_element(c, term, e, min));
     }

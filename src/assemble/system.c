@@ -599,18 +599,6 @@ static drape_sums into_values(const drape_system *system, double *values)
     return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
 }
 
-static void add_masses(const drape_system *system, double mass_weight, double *values)
-{
-    const drape_model *model = system->model;
-    const drape_pattern *pattern = system->pattern;
-    for (int32_t j = 0; j < model->free_count; j++) {
-        int64_t stride;
-        double *to = drape_pattern_at(pattern, values, j, pattern->diagonal[j], &stride);
-        for (int c = 0; c < 3; c++)
-            to[c * stride + c] += mass_weight * model->mass[model->node_of_free[j]];
-    }
-}
-
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values)
 {
@@ -634,7 +622,14 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *give
         drape_contact_add_jacobian(system->contact, point.weight, point.contact, positive_share,
                                    system->pattern, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
-    add_masses(system, mass_weight, values);
+    const drape_model *model = system->model;
+    const drape_pattern *pattern = system->pattern;
+    for (int32_t j = 0; j < model->free_count; j++) {
+        int64_t stride;
+        double *diagonal = drape_pattern_at(pattern, values, j, pattern->diagonal[j], &stride);
+        for (int c = 0; c < 3; c++)
+            diagonal[c * stride + c] += mass_weight * model->mass[model->node_of_free[j]];
+    }
     drape_system_project_matrix(system, values);
 }
 
@@ -1040,21 +1035,6 @@ void drape_system_stress(drape_system *system, const drape_point *given, const d
 
 /* ---- Checks ---- */
 
-static drape_diagnostic diagnose_element(const drape_term *term, const drape_fault *fault)
-{
-    const drape_elements *el = &term->elements;
-    drape_diagnostic diagnostic = {.what = fault->what,
-                                   .term = term->ops->entry.name,
-                                   .element = fault->element,
-                                   .node = {-1, -1, -1, -1},
-                                   .cloth = term->cloth,
-                                   .value = fault->value,
-                                   .limit = fault->limit};
-    for (int a = 0; fault->element >= 0 && a < el->nodes && a < 4; a++)
-        diagnostic.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
-    return diagnostic;
-}
-
 static drape_status check_terms(const drape_system *system, const double *given, const double *given_before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic)
 {
@@ -1070,7 +1050,17 @@ static drape_status check_terms(const drape_system *system, const double *given,
         drape_status status = term->ops->check(&el, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
-            *diagnostic = diagnose_element(term, &fault);
+            const drape_elements *elements = &term->elements;
+            drape_diagnostic found = {.what = fault.what,
+                                      .term = term->ops->entry.name,
+                                      .element = fault.element,
+                                      .node = {-1, -1, -1, -1},
+                                      .cloth = term->cloth,
+                                      .value = fault.value,
+                                      .limit = fault.limit};
+            for (int a = 0; fault.element >= 0 && a < elements->nodes && a < 4; a++)
+                found.node[a] = elements->node[(size_t)fault.element * (size_t)elements->nodes + (size_t)a];
+            *diagnostic = found;
             return status;
         }
     }

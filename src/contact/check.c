@@ -307,16 +307,6 @@ static void place_on_path(const drape_contact *c, double t, double end, double *
     drape_contact_fill(c, x, pose, x);
 }
 
-static void find_swings(drape_contact *c, const piece *p)
-{
-    const drape_configuration *end = p->path.end;
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        drape_swing_between(&end[0].pose[k], &end[1].pose[k], c->model->colliders[k].pivot, &c->swing[k]);
-        /* the points of one that deforms move straight in space between the pieces, which are short */
-        c->swing[k].turns = c->swing[k].turns && !c->deformed[k];
-    }
-}
-
 /* Checks the path from the beginning of the step to where contact is evaluated, at time t: piece by piece
  * between the kinks of tracks, in which no collider turns far. */
 static drape_status check_path(drape_contact *c, double t, bool surfaces, const char **reason,
@@ -335,7 +325,13 @@ static drape_status check_path(drape_contact *c, double t, bool surfaces, const 
             place_on_path(c, at, t, x[i], pose[i]);
         p.path.end[1] =
             (drape_configuration){.model = c->model, .x = end ? c->x : x[i], .pose = end ? c->pose : pose[i]};
-        find_swings(c, &p);
+        const drape_configuration *ends = p.path.end;
+        for (int32_t k = 0; k < c->model->collider_count; k++) {
+            drape_swing_between(&ends[0].pose[k], &ends[1].pose[k], c->model->colliders[k].pivot,
+                                &c->swing[k]);
+            /* the points of one that deforms move straight in space between the pieces, which are short */
+            c->swing[k].turns = c->swing[k].turns && !c->deformed[k];
+        }
         status = surfaces ? check_surfaces(c, &p, reason, diagnostic) : DRAPE_OK;
         if (!status)
             status = check_features(c, &p, reason, diagnostic);

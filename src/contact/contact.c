@@ -503,24 +503,6 @@ static double lesser_path(const double from[3], const double to[3], const double
     return fmin(vec3_norm(own), vec3_norm(relative));
 }
 
-/* How far the points of a collider that deforms move at most, as lesser_path. */
-static double deforming_path_of(const drape_contact *c, int32_t collider, double t, const double mean[3])
-{
-    drape_collider_pose from, to;
-    double largest = 0;
-    drape_motion_pose(c->motion, collider, t, t, &from);
-    drape_motion_pose(c->motion, collider, t + c->dt, t + c->dt, &to);
-    drape_motion_points(c->motion, collider, t, c->own);
-    drape_motion_points(c->motion, collider, t + c->dt, c->own_end);
-    for (size_t p = 0; p < (size_t)c->model->colliders[collider].shape.point_count; p++) {
-        double a[3], b[3];
-        drape_pose_point(&from, c->own + 3 * p, a);
-        drape_pose_point(&to, c->own_end + 3 * p, b);
-        largest = fmax(largest, lesser_path(a, b, mean));
-    }
-    return largest;
-}
-
 /* How far a collider moves in a nominal step from time t on, or relative to the mean motion of the cloth. */
 static double path_of(const drape_contact *c, int32_t collider, double t)
 {
@@ -537,8 +519,22 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
         c->ranks->sum(c->ranks, mean, 3);
     for (size_t k = 0; k < 3; k++)
         mean[k] *= c->dt / (double)drape_model_node_count(c->model);
-    if (deforms)
-        return deforming_path_of(c, collider, t, mean);
+    if (deforms) {
+        /* How far the points of a collider that deforms move at most, as lesser_path. */
+        drape_collider_pose before, after;
+        double largest = 0;
+        drape_motion_pose(c->motion, collider, t, t, &before);
+        drape_motion_pose(c->motion, collider, t + c->dt, t + c->dt, &after);
+        drape_motion_points(c->motion, collider, t, c->own);
+        drape_motion_points(c->motion, collider, t + c->dt, c->own_end);
+        for (size_t p = 0; p < (size_t)c->model->colliders[collider].shape.point_count; p++) {
+            double a[3], b[3];
+            drape_pose_point(&before, c->own + 3 * p, a);
+            drape_pose_point(&after, c->own_end + 3 * p, b);
+            largest = fmax(largest, lesser_path(a, b, mean));
+        }
+        return largest;
+    }
     return lesser_path(from, to, mean) + turning_path_of(c, collider, t);
 }
 

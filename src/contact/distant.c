@@ -11,23 +11,6 @@
 #define STALE   0.25                /* of its gap: a node that has moved by more is looked at again */
 #define CLUSTER DRAPE_CLUSTER_FACES /* nodes of one */
 
-/* Nodes in the order in which faces have them first, then those that no face has. */
-static void order_nodes(const drape_path_bvh *faces, drape_distant *d, bool *listed)
-{
-    const int32_t nodes = d->model->node_count;
-    int32_t count = 0;
-    for (int32_t f = 0; f < faces->count; f++)
-        for (int a = 0; a < faces->nodes; a++) {
-            const int32_t node = faces->node[(size_t)faces->order[f] * (size_t)faces->nodes + (size_t)a];
-            if (!listed[node])
-                d->order[count++] = node;
-            listed[node] = true;
-        }
-    for (int32_t i = 0; i < nodes; i++)
-        if (!listed[i])
-            d->order[count++] = i;
-}
-
 drape_status drape_distant_create(drape_arena *arena, const drape_model *model, const drape_path_bvh *faces,
                                   drape_distant *out)
 {
@@ -43,7 +26,19 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
         return drape_arena_status(arena);
     for (size_t i = 0; i < count; i++)
         out->seen[i].gap = -INFINITY;
-    order_nodes(faces, out, listed);
+    /* Nodes in the order in which faces have them first, then those that no face has. */
+    const int32_t all = out->model->node_count;
+    int32_t ordered = 0;
+    for (int32_t f = 0; f < faces->count; f++)
+        for (int a = 0; a < faces->nodes; a++) {
+            const int32_t node = faces->node[(size_t)faces->order[f] * (size_t)faces->nodes + (size_t)a];
+            if (!listed[node])
+                out->order[ordered++] = node;
+            listed[node] = true;
+        }
+    for (int32_t i = 0; i < all; i++)
+        if (!listed[i])
+            out->order[ordered++] = i;
     drape_arena_release(arena, listed);
     return DRAPE_OK;
 }

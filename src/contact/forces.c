@@ -129,26 +129,6 @@ void drape_contact_velocities(const drape_contact *c, const drape_active_contact
     }
 }
 
-/* The forces on a collider act on the surface around its points or, if it is smooth, where the nodes are:
- * there its velocity was taken, so that their work is what the cloth is given. */
-static void add_moment(const drape_contact *c, const drape_active_contact *contact, const double *from,
-                       double *moment)
-{
-    const bool surface = contact->pair.kind == DRAPE_PAIR_SURFACE;
-    for (int a = 0; a < contact->gap.closest.points; a++) {
-        const int32_t node = contact->pair.node[a];
-        double own[3], x[3];
-        if (!surface && node < c->model->node_count)
-            continue;
-        memcpy(x, c->x + 3 * (size_t)node, sizeof x);
-        if (!surface)
-            vec3_add_scaled(drape_contact_arm(c, contact), contact->gap.closest.normal, x);
-        drape_pose_own(&c->pose[contact->pair.collider], x, own);
-        for (int i = 0; i < 9; i++)
-            moment[i] += (surface ? -1 : 1) * from[3 * a + i / 3] * own[i % 3];
-    }
-}
-
 static void scatter(drape_contact *c, const drape_active_contact *contact, const double *from, double *g)
 {
     const int32_t *node = contact->pair.node,
@@ -159,8 +139,24 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
             if (collider >= 0)
                 c->on_collider[collider].force[k] -= from[3 * a + k];
         }
-    if (collider >= 0)
-        add_moment(c, contact, from, c->on_collider[collider].moment);
+    if (collider >= 0) {
+        /* The forces on a collider act on the surface around its points or, if it is smooth, where the
+         * nodes are: there its velocity was taken, so that their work is what the cloth is given. */
+        double *moment = c->on_collider[collider].moment;
+        const bool surface = contact->pair.kind == DRAPE_PAIR_SURFACE;
+        for (int a = 0; a < contact->gap.closest.points; a++) {
+            const int32_t point = contact->pair.node[a];
+            double own[3], x[3];
+            if (!surface && point < c->model->node_count)
+                continue;
+            memcpy(x, c->x + 3 * (size_t)point, sizeof x);
+            if (!surface)
+                vec3_add_scaled(drape_contact_arm(c, contact), contact->gap.closest.normal, x);
+            drape_pose_own(&c->pose[contact->pair.collider], x, own);
+            for (int i = 0; i < 9; i++)
+                moment[i] += (surface ? -1 : 1) * from[3 * a + i / 3] * own[i % 3];
+        }
+    }
     if (collider >= 0 && c->deformed[collider])
         add_on_points(c, contact, from);
 }

@@ -193,8 +193,8 @@ static bool frame_of(double corner[3][3], double frame[3][3])
     return length > 0;
 }
 
-/* The direction from the triangle to the node when they meet_triangle turns with the triangle until the end. Moves the
- * end of the node along it; returns whether it had to. */
+/* The direction from the triangle to the node when they meet turns with the triangle until the end. Moves
+ * the end of the node along it; returns whether it had to. */
 static bool slide_on_triangle(const meeting *m, double *y)
 {
     const double *x = m->contact->start, aim = aim_of(&m->pair, m->gap), t = m->fraction;

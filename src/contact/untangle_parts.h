@@ -1,8 +1,8 @@
 /*
- * untangle_parts.h: what the files of untangle.h share. untangle.c: the sweeps, and the positions that satisfy
- * all bounds with the least distortion; untangle_contours.c: where sheets pass through each other, and which
- * part of them is on the wrong side; untangle_bodies.c: what is inside closed colliders; untangle_gaps.c: pairs
- * that are apart and stay so.
+ * untangle_parts.h: what the files of untangle.h share. untangle.c: the sweeps, and the positions that
+ * satisfy all bounds with the least distortion; untangle_contours.c: where sheets pass through each other,
+ * and which part of them is on the wrong side; untangle_bodies.c: what is inside closed colliders;
+ * untangle_gaps.c: pairs that are apart and stay so.
  */
 #ifndef DRAPE_CONTACT_UNTANGLE_PARTS_H
 #define DRAPE_CONTACT_UNTANGLE_PARTS_H

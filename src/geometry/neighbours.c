@@ -127,18 +127,6 @@ static inline void search_range(const drape_neighbours *s, search *q, uint64_t r
     q->count = count;
 }
 
-static inline void search_row(const drape_neighbours *s, search *q, int32_t y, int32_t z)
-{
-    uint64_t row = row_of(y, z);
-    int32_t first = bucket_of(s, q->low[0], y, z), last = first + (q->high[0] - q->low[0]) + 1;
-    if (last <= s->buckets) {
-        search_range(s, q, row, s->start[first], s->start[last]);
-        return;
-    }
-    search_range(s, q, row, s->start[first], s->start[s->buckets]);
-    search_range(s, q, row, 0, s->start[last - s->buckets]);
-}
-
 int drape_neighbours_search(const drape_neighbours *s, int32_t point, const double *x,
                             int32_t found[DRAPE_MAX_NEIGHBOURS + 1])
 {
@@ -149,8 +137,16 @@ int drape_neighbours_search(const drape_neighbours *s, int32_t point, const doub
         q.high[k] = box_number(x[k] + ball, s->per_box);
     }
     for (int32_t y = q.low[1]; y <= q.high[1]; y++)
-        for (int32_t z = q.low[2]; z <= q.high[2]; z++)
-            search_row(s, &q, y, z);
+        for (int32_t z = q.low[2]; z <= q.high[2]; z++) {
+            uint64_t row = row_of(y, z);
+            int32_t first = bucket_of(s, q.low[0], y, z), last = first + (q.high[0] - q.low[0]) + 1;
+            if (last <= s->buckets) {
+                search_range(s, &q, row, s->start[first], s->start[last]);
+                continue;
+            }
+            search_range(s, &q, row, s->start[first], s->start[s->buckets]);
+            search_range(s, &q, row, 0, s->start[last - s->buckets]);
+        }
     if (q.count > DRAPE_MAX_NEIGHBOURS)
         return -1;
     for (int i = 1; i < q.count; i++) {

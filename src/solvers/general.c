@@ -41,40 +41,6 @@ static bool take_roots(int64_t n, const double *largest, double *step, double *f
     return true;
 }
 
-/* scaled (nonzeros) = R A C; row and column (n) are the diagonals of R and C, equal if the matrix is
- * symmetric. work (4 n) is workspace. False if a row or a column is zero: the matrix is singular. */
-static bool equilibrate(const drape_pattern *p, const double *values, bool symmetric, double *row,
-                        double *column, double *scaled, double *work)
-{
-    const size_t n = (size_t)p->n;
-    double *row_step = work, *column_step = work + n, *row_largest = work + 2 * n,
-           *column_largest = work + 3 * n;
-    bool done = false, regular = true;
-    memcpy(scaled, values, (size_t)p->nonzeros * sizeof *scaled);
-    for (size_t i = 0; i < n; i++)
-        row[i] = column[i] = row_step[i] = column_step[i] = 1;
-    /* each pass halves the exponents; the largest then are between 1/4 and 2 */
-    for (int range = DBL_MAX_EXP - DBL_MIN_EXP; regular && !done && range > 0; range /= 2) {
-        /* Multiplies by the factors, and finds the largest magnitude of each row and column. */
-        memset(row_largest, 0, (size_t)p->n * sizeof *row_largest);
-        for (int64_t j = 0; j < p->n; j++) {
-            double most = 0;
-            for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
-                const int64_t i = drape_pattern_row(p, j, k);
-                scaled[k] *= row_step[i] * column_step[j];
-                const double size = fabs(scaled[k]);
-                most = size > most ? size : most;
-                row_largest[i] = size > row_largest[i] ? size : row_largest[i];
-            }
-            column_largest[j] = most;
-        }
-        done = true;
-        regular = take_roots(p->n, symmetric ? column_largest : row_largest, row_step, row, &done) &&
-                  take_roots(p->n, column_largest, column_step, column, &done);
-    }
-    return regular;
-}
-
 /* ---- The last resort ---- */
 
 static void discard_klu(drape_general *g)
@@ -182,7 +148,38 @@ static bool scale(drape_general *g, const double *values, bool symmetric)
 {
     g->lu.symmetric = symmetric;
     g->fronts->values = g->scaled;
-    return equilibrate(g->fronts->pattern, values, symmetric, g->row, g->column, g->scaled, g->refine.basis);
+    /* g->scaled (nonzeros) = R A C; g->row and g->column (n) are the diagonals of R and C, equal if the
+     * matrix is symmetric. False if a row or a column is zero: the matrix is singular. */
+    const drape_pattern *p = g->fronts->pattern;
+    double *scaled = g->scaled;
+    double *work = g->refine.basis;
+    const size_t n = (size_t)p->n;
+    double *row_step = work, *column_step = work + n, *row_largest = work + 2 * n,
+           *column_largest = work + 3 * n;
+    bool done = false, regular = true;
+    memcpy(scaled, values, (size_t)p->nonzeros * sizeof *scaled);
+    for (size_t i = 0; i < n; i++)
+        g->row[i] = g->column[i] = row_step[i] = column_step[i] = 1;
+    /* each pass halves the exponents; the largest then are between 1/4 and 2 */
+    for (int range = DBL_MAX_EXP - DBL_MIN_EXP; regular && !done && range > 0; range /= 2) {
+        /* Multiplies by the factors, and finds the largest magnitude of each row and column. */
+        memset(row_largest, 0, (size_t)p->n * sizeof *row_largest);
+        for (int64_t j = 0; j < p->n; j++) {
+            double most = 0;
+            for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
+                const int64_t i = drape_pattern_row(p, j, k);
+                scaled[k] *= row_step[i] * column_step[j];
+                const double size = fabs(scaled[k]);
+                most = size > most ? size : most;
+                row_largest[i] = size > row_largest[i] ? size : row_largest[i];
+            }
+            column_largest[j] = most;
+        }
+        done = true;
+        regular = take_roots(p->n, symmetric ? column_largest : row_largest, row_step, g->row, &done) &&
+                  take_roots(p->n, column_largest, column_step, g->column, &done);
+    }
+    return regular;
 }
 
 drape_status drape_general_factor(drape_general *g, const double *values, bool symmetric)

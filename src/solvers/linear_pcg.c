@@ -36,14 +36,6 @@ typedef struct fallback {
 
 extern const drape_linear_ops drape_linear_multifrontal;
 
-/* The arena must stay at its address. Takes no memory. */
-static fallback fallback_of(drape_arena *arena, const drape_pattern *pattern)
-{
-    return (fallback){.ops = pattern->ranks ? pattern->ranks->direct : &drape_linear_multifrontal,
-                      .pattern = pattern,
-                      .arena = drape_arena_within(arena)};
-}
-
 static void fallback_destroy(fallback *f)
 {
     drape_linear_destroy(f->ops, &f->solver);
@@ -76,40 +68,10 @@ static drape_status create_fallback(fallback *f)
     return status;
 }
 
-/* Errors: those of the solver's create and factor; after one it is not active, and may be called again. */
-static drape_status fallback_factor(fallback *f, const double *values)
-{
-    f->count++;
-    drape_status status = f->solver ? DRAPE_OK : create_fallback(f);
-    if (!status)
-        status = f->ops->factor(f->solver, values);
-    f->active = !status;
-    return status;
-}
-
-/* Archives the state of the solver and the owner's *factored; values as in drape_linear_ops.archive. */
-static void fallback_archive(fallback *f, bool *factored, drape_archive *a, const double *values)
-{
-    bool there = f->solver != NULL;
-    drape_archive_int64(a, &f->count);
-    drape_archive_bool(a, &f->active);
-    drape_archive_bool(a, factored);
-    drape_archive_bool(a, &there);
-    if (drape_archive_has_read(a) && there && !f->solver)
-        drape_archive_note(a, create_fallback(f));
-    if (drape_archive_good(a) && there)
-        drape_linear_archive(f->ops, f->solver, a, f->active ? values : NULL);
-}
-
 /* The owner's report; the bytes that libraries took. */
 static drape_linear_report fallback_report(const fallback *f, const drape_linear_ops *owner)
 {
     return (drape_linear_report){.ops = owner, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
-}
-
-static size_t fallback_bytes(const fallback *f)
-{
-    return f->solver ? drape_linear_bytes(f->ops, f->solver) : 0;
 }
 
 extern const drape_linear_ops drape_linear_pcg;
@@ -145,7 +107,9 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
         return DRAPE_E_MEMORY;
     s->arena = arena;
     s->pattern = pattern;
-    s->fallback = fallback_of(arena, pattern);
+    s->fallback = (fallback){.ops = pattern->ranks ? pattern->ranks->direct : &drape_linear_multifrontal,
+                             .pattern = pattern,
+                             .arena = drape_arena_within(arena)};
     s->positions = drape_arena_take(arena, n, sizeof *s->positions);
     s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
     s->pcg = drape_pcg_of(arena, drape_pattern_own(pattern), s, multiply, precondition);
@@ -181,7 +145,12 @@ static drape_status factor_general(pcg_state *s)
                   s->pattern->n, DRAPE_MOST_FACTORED);
         return DRAPE_RETRY_LINEAR;
     }
-    drape_status status = fallback_factor(&s->fallback, s->values);
+    fallback *f = &s->fallback;
+    f->count++;
+    drape_status status = f->solver ? DRAPE_OK : create_fallback(f);
+    if (!status)
+        status = f->ops->factor(f->solver, s->values);
+    f->active = !status;
     s->factored = !status;
     return status;
 }
@@ -254,7 +223,16 @@ static drape_status solve(void *state, const double *b, double *x)
 static void archive(void *state, drape_archive *a, const double *values)
 {
     pcg_state *s = state;
-    fallback_archive(&s->fallback, &s->factored, a, values);
+    fallback *f = &s->fallback;
+    bool there = f->solver != NULL;
+    drape_archive_int64(a, &f->count);
+    drape_archive_bool(a, &f->active);
+    drape_archive_bool(a, &s->factored);
+    drape_archive_bool(a, &there);
+    if (drape_archive_has_read(a) && there && !f->solver)
+        drape_archive_note(a, create_fallback(f));
+    if (drape_archive_good(a) && there)
+        drape_linear_archive(f->ops, f->solver, a, f->active ? values : NULL);
     drape_archive_bool(a, &s->definite);
     if (!values)
         return;
@@ -268,7 +246,8 @@ static void archive(void *state, drape_archive *a, const double *values)
 
 static size_t bytes(const void *state)
 {
-    return fallback_bytes(&((const pcg_state *)state)->fallback);
+    const fallback *f = &((const pcg_state *)state)->fallback;
+    return f->solver ? drape_linear_bytes(f->ops, f->solver) : 0;
 }
 
 static void report(const void *state, drape_linear_report *out)
