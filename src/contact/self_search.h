@@ -9,7 +9,7 @@
 #define DRAPE_CONTACT_SELF_SEARCH_H
 
 #include "contact/flat.h"
-#include "geometry/path_box.h"
+#include "geometry/path_bvh.h"
 
 typedef struct drape_self_search {
     drape_clusters clusters;

@@ -18,7 +18,7 @@ typedef struct drape_general {
     drape_fronts *fronts;
     drape_block_lu lu;
     drape_refine refine;
-    double *scaled, *row, *column; /* (nonzeros), (n), (n): see equilibrate */
+    double *scaled, *row, *column; /* (nonzeros), (n), (n): see general.c */
     double *b, *x;                 /* (n) of the scaled matrix */
     bool factored;                 /* by `lu`; otherwise by KLU */
     drape_arena klu_arena;

@@ -269,28 +269,23 @@ static drape_status aggregate(drape_arena *arena, drape_arena *scratch, level *l
     return agree(ranks_of(l), arena, l->member_start);
 }
 
-/* The prolongation, and which rows and columns the next matrix has. */
-static drape_status prolong(drape_arena *arena, drape_arena *scratch, level *l, level *next, lists *reach)
-{
-    drape_status status = l->border ? drape_border_number(arena, l, next) : DRAPE_OK;
-    if (!status)
-        status = agree(ranks_of(l), arena, !build_prolongation(arena, l));
-    next->a = (matrix){.size = MODES, .count = l->coarse, .columns = l->coarse};
-    if (!status && l->border)
-        status = drape_border_prolong(arena, scratch, l, next, reach);
-    if (status)
-        return status;
-    const size_t blocks = (size_t)l->p_start[l->a.columns];
-    l->p = drape_arena_take(arena, blocks * (size_t)l->a.size * MODES, sizeof *l->p);
-    return drape_arena_status(arena);
-}
-
 /* Makes the next coarser matrix and its graph from that of the level. */
 static drape_status coarsen(drape_arena *arena, drape_arena *scratch, level *l, graph *g, level *next)
 {
     lists reach = {0};
     graph smaller;
-    drape_status status = prolong(arena, scratch, l, next, &reach);
+    /* The prolongation, and which rows and columns the next matrix has. */
+    drape_status status = l->border ? drape_border_number(arena, l, next) : DRAPE_OK;
+    if (!status)
+        status = agree(ranks_of(l), arena, !build_prolongation(arena, l));
+    next->a = (matrix){.size = MODES, .count = l->coarse, .columns = l->coarse};
+    if (!status && l->border)
+        status = drape_border_prolong(arena, scratch, l, next, &reach);
+    if (!status) {
+        const size_t blocks = (size_t)l->p_start[l->a.columns];
+        l->p = drape_arena_take(arena, blocks * (size_t)l->a.size * MODES, sizeof *l->p);
+        status = drape_arena_status(arena);
+    }
     int32_t *largest = status ? NULL : drape_arena_take(scratch, (size_t)next->a.columns, sizeof *largest);
     if (!status)
         status = largest ? shrink(scratch, l, g, next->a.columns, &smaller) : DRAPE_E_MEMORY;
@@ -328,15 +323,6 @@ static drape_status make_graph(drape_arena *scratch, const level *l, graph *out)
     return DRAPE_OK;
 }
 
-static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape_multigrid *m, graph *g);
-
-/* What each rank has as a whole. */
-static drape_status gather(drape_arena *arena, drape_arena *scratch, drape_multigrid *m, graph *g)
-{
-    const drape_status status = drape_border_gather(arena, scratch, &m->level[m->count - 1], g, &m->whole);
-    return status ? status : build_levels(arena, scratch, m->whole.multigrid, g);
-}
-
 /* Whether each rank has the level as a whole: the work on it is then done by all, which its exchanges cost no
  * less than if it is small. */
 static bool is_small(const level *l)
@@ -353,8 +339,11 @@ static drape_status build_levels(drape_arena *arena, drape_arena *scratch, drape
     for (m->count = 1; more; m->count += more) {
         level *l = &m->level[m->count - 1];
         drape_status status = agree(ranks_of(l), arena, !take_vectors(arena, l));
-        if (!status && l->border && m->count > 1 && is_small(l))
-            status = gather(arena, scratch, m, g);
+        if (!status && l->border && m->count > 1 && is_small(l)) {
+            status = drape_border_gather(arena, scratch, l, g, &m->whole);
+            if (!status) /* the levels that each rank has as a whole */
+                status = build_levels(arena, scratch, m->whole.multigrid, g);
+        }
         more = !m->whole.multigrid && (l->border || l->a.count > DENSE) && m->count < MAX_LEVELS;
         if (!status && more)
             status = aggregate(arena, scratch, l, g, &more);
