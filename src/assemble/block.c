@@ -421,42 +421,33 @@ static void carry_wind(const drape_term *term, const double *gradient, const dou
         }
 }
 
-/* The force of the dissipation, if that is wanted, else 0. */
-static void evaluate_drag(const drape_term *term, const drape_elements *el, const drape_request *want,
-                          const double *v, drape_block *b)
-{
-    const size_t d = 3 * (size_t)el->nodes, count = (size_t)b->count;
-    memset(b->energy, 0, count * sizeof *b->energy);
-    if (want->dissipative) {
-        term->ops->dissipation(el, b->first, b->count, want->point->x, v, b->gradient,
-                               want->hessian ? b->hessian : NULL, want->hessian ? b->scratch : NULL);
-        return;
-    }
-    memset(b->gradient, 0, count * d * sizeof *b->gradient);
-    for (size_t i = 0; want->hessian && i < count * d * d; i++)
-        b->hessian[i] = b->scratch[i] = 0;
-}
-
 static void evaluate_dissipations(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
     const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
     const drape_elements el = elements_at(term, want->point);
     const double *v = wind ? want->against : want->point->v;
-    evaluate_drag(term, &el, want, v, b);
+    const size_t numbers = (size_t)b->count * (size_t)d;
+    memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
+    if (want->dissipative)
+        term->ops->dissipation(&el, b->first, b->count, want->point->x, v, b->gradient,
+                               hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    else {
+        memset(b->gradient, 0, numbers * sizeof *b->gradient);
+        for (size_t i = 0; hessian && i < numbers * (size_t)d; i++)
+            b->hessian[i] = b->scratch[i] = 0;
+    }
     for (int32_t i = 0; term->ops->kinetic && want->conservative && i < b->count; i++) {
         const size_t at = (size_t)i * (size_t)(d * d);
         /* Adds r dT/dv - dT/dx of one element to its force, and the derivatives by x and v to dg_dx and
          * dg_dv (d x d), unless they are NULL. In a step w = r: what r T_vx - w T_xv adds is
          * antisymmetric, and the positive semidefinite part is w r T_vv. */
-        const int32_t element = b->first + i;
-        double *g = b->gradient + (size_t)i * (size_t)d;
-        double *dg_dx = hessian ? b->hessian + at : NULL;
-        double *dg_dv = hessian ? b->scratch + at : NULL;
+        double *g = b->gradient + (size_t)i * (size_t)d, *dg_dx = hessian ? b->hessian + at : NULL,
+               *dg_dv = hessian ? b->scratch + at : NULL;
         const drape_point *point = want->point;
         const double r = point->momentum, exact = 1 - want->positive_share;
         double by_x[D], by_v[D], xx[D * D], vx[D * D], vv[D * D];
-        term->ops->kinetic(&el, element, 1, point->x, v,
+        term->ops->kinetic(&el, b->first + i, 1, point->x, v,
                            &(drape_kinetic){.by_x = by_x,
                                             .by_v = by_v,
                                             .xx = dg_dx ? xx : NULL,

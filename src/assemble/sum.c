@@ -133,27 +133,6 @@ static void add_gradients(const drape_coupling *pieces, const drape_block *b, co
     }
 }
 
-static void share_energies(const drape_term *term, const drape_block *b, double *node_energy)
-{
-    const int n = term->elements.nodes;
-    for (int32_t i = 0; i < b->count; i++) {
-        const int32_t *node = term->elements.node + (size_t)(b->first + i) * (size_t)n;
-        for (int a = 0; a < n; a++)
-            node_energy[node[a]] += b->energy[i] / n;
-    }
-}
-
-/* The same for elements with parts, of which the first `used` nodes of a patch are all. */
-static void share_patch_energies(const drape_term *term, const drape_parts_work *work, double *node_energy)
-{
-    const drape_patches *p = &term->patches;
-    for (int32_t i = 0; i < p->count; i++)
-        for (int32_t e = p->first[i]; e < p->first[i + 1]; e++)
-            for (int a = 0; a < p->used[i]; a++)
-                node_energy[p->node[(size_t)i * (size_t)term->elements.nodes + (size_t)a]] +=
-                    work->energy[e] / p->used[i];
-}
-
 /* to(r, c) += sign from(r, c); the rows of `from` are `row` apart, its columns `column`. */
 static inline void add_block(const double *from, int row, int column, double sign, double *to, int64_t stride)
 {
@@ -265,10 +244,11 @@ static void add_patches(const drape_summer *s, const drape_term *term, const dra
 
 /* ---- Sums ---- */
 
-static bool contributes(const drape_summer *s, const drape_term *term, const drape_request *want,
-                        const drape_sums *to)
+static bool is_wanted(const drape_summer *s, int32_t number, const drape_request *want, const drape_sums *to)
 {
-    if (term->ops->law || drape_summer_leaves(s, term) || (to->values && !to->g && term->ops->linear))
+    const drape_term *term = &s->model->terms[number];
+    if ((want->without && want->without[number]) || term->ops->law || drape_summer_leaves(s, term) ||
+        (to->values && !to->g && term->ops->linear))
         return false;
     if (want->momentum)
         return term->ops->kinetic;
@@ -291,11 +271,6 @@ static void evaluate(const drape_summer *s, const drape_term *term, const drape_
         drape_parts_evaluate(term, want, work, b);
     else
         drape_block_evaluate(term, want, b);
-}
-
-static bool is_wanted(const drape_summer *s, int32_t term, const drape_request *want, const drape_sums *to)
-{
-    return !(want->without && want->without[term]) && contributes(s, &s->model->terms[term], want, to);
 }
 
 static bool touches(const reach *reaches, int32_t block, const share *own)
@@ -430,21 +405,27 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
 {
     const share all = {0, s->model->node_count};
     const drape_parts_work *work = s->parts[term - s->model->terms];
+    const drape_patches *p = &term->patches;
+    const int32_t n = term->elements.nodes, *node = term->elements.node;
     double sum = 0;
     prepare_term(s, term, want);
     for (int32_t k = 0; (!work || to->g || to->values) && k < block_count(term); k++) {
         evaluate(s, term, want, k, &s->blocks[0]);
         add(s, term, &s->blocks[0], &all, to);
-        if (to->node_energy && !work)
-            share_energies(term, &s->blocks[0], to->node_energy);
+        for (int32_t i = 0; to->node_energy && !work && i < s->blocks[0].count; i++)
+            for (int a = 0; a < n; a++)
+                to->node_energy[node[n * (s->blocks[0].first + i) + a]] += s->blocks[0].energy[i] / n;
         for (int32_t i = 0; energy && !work && i < s->blocks[0].count; i++)
             if (is_counted(term, s->blocks[0].first + i))
                 sum += s->blocks[0].energy[i];
     }
     for (int32_t k = 0; to->values && k < blocks_of(term->patches.count); k++)
         add_patches(s, term, want, k, &all, to);
-    if (to->node_energy && work)
-        share_patch_energies(term, work, to->node_energy);
+    for (int32_t i = 0; to->node_energy && work && i < p->count;
+         i++) /* the first `used` nodes of a patch are all */
+        for (int32_t e = p->first[i]; e < p->first[i + 1]; e++)
+            for (int a = 0; a < p->used[i]; a++)
+                to->node_energy[p->node[(size_t)i * (size_t)n + (size_t)a]] += work->energy[e] / p->used[i];
     for (int32_t e = 0; energy && work && e < term->elements.count; e++)
         if (is_counted(term, e))
             sum += work->energy[e];

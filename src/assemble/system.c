@@ -52,14 +52,6 @@ struct drape_system {
 
 /* ---- Creation ---- */
 
-static bool has_turning(const drape_model *model)
-{
-    bool found = false;
-    for (int32_t i = 0; i < model->term_count && !found; i++)
-        found = drape_term_turns(&model->terms[i]);
-    return found;
-}
-
 drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out)
 {
@@ -76,7 +68,10 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
     for (int k = 0; k < 2 && model->has_kinetic; k++)
         system->moving[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
-    for (int k = 0; k < 2 && has_turning(model); k++)
+    bool turns = false;
+    for (int32_t i = 0; i < model->term_count && !turns; i++)
+        turns = drape_term_turns(&model->terms[i]);
+    for (int k = 0; k < 2 && turns; k++)
         system->middle[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
     double **const moved[] = {&system->held,     &system->started.x, &system->started.v,
                               &system->space[0], &system->space[1],  &system->space[2]};

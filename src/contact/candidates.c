@@ -52,20 +52,6 @@ static double wanted_gap(const search *s, const drape_pair *pair)
     return drape_broad_phase_wanted(s->broad, s->passing, pair->distance) + s->reach;
 }
 
-/* Whether a node stays beyond the reach of a surface on the whole path. */
-static bool stays_beyond(const search *s, const drape_pair *pair)
-{
-    const int32_t node = pair->node[0], collider = pair->collider;
-    bool beyond = true;
-    for (int end = 0; beyond && end < (s->moves ? 2 : 1); end++) {
-        const drape_configuration *at = &s->path->end[end];
-        double own[3];
-        drape_pose_own(&at->pose[collider], at->x + 3 * (size_t)node, own);
-        beyond = drape_distant_keeps(&s->broad->distant, collider, node, own, wanted_gap(s, pair));
-    }
-    return beyond;
-}
-
 /* How far a node moves relative to a surface, straight in the coordinates of that. */
 static double move_to_surface(const drape_straight_path *path, const drape_pair *pair)
 {
@@ -137,7 +123,13 @@ static void find_surfaces(search *s, const bool *marked)
             if (!wanted[node] || drape_model_ignores(m, k, node))
                 continue;
             const drape_pair pair = drape_broad_phase_surface(broad, node, k);
-            if (!stays_beyond(s, &pair))
+            bool beyond = true; /* the node stays beyond the reach of the surface on the whole path */
+            for (int e = 0; beyond && e < (s->moves ? 2 : 1); e++) {
+                double own[3];
+                drape_pose_own(&end[e].pose[k], end[e].x + 3 * (size_t)node, own);
+                beyond = drape_distant_keeps(&broad->distant, k, node, own, wanted_gap(s, &pair));
+            }
+            if (!beyond)
                 consider(s, &pair);
         }
     }
@@ -297,14 +289,6 @@ static double distance_from(const drape_candidates *c, int set, const drape_conf
     return largest;
 }
 
-static double measure(const drape_candidates *c, int set, const drape_straight_path *path)
-{
-    const double first = distance_from(c, set, &path->end[0], false);
-    if (isinf(first) || (path->end[1].x == path->end[0].x && path->end[1].pose == path->end[0].pose))
-        return first;
-    return fmax(first, distance_from(c, set, &path->end[1], true));
-}
-
 static bool has_stale(const drape_candidates *c)
 {
     bool found = false;
@@ -315,9 +299,12 @@ static bool has_stale(const drape_candidates *c)
 
 drape_distances drape_candidates_distances(const drape_candidates *c, const drape_straight_path *path)
 {
+    const bool moves = path->end[1].x != path->end[0].x || path->end[1].pose != path->end[0].pose;
     drape_distances away = {.set = {INFINITY}};
     for (int i = 0; i < c->sets && !has_stale(c); i++) {
-        away.set[i] = measure(c, i, path);
+        away.set[i] = distance_from(c, i, &path->end[0], false);
+        if (!isinf(away.set[i]) && moves)
+            away.set[i] = fmax(away.set[i], distance_from(c, i, &path->end[1], true));
         if (!(away.set[i] <= c->margin))
             break;
     }

@@ -128,20 +128,6 @@ static bool keeps_least(const drape_keep *keep)
     return keep->above == 0 && keep->arrival == 0;
 }
 
-/* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are, at
- * most. Searched if there are none; NULL for a path that is too long or on which only few pairs matter, or if
- * there is no memory. */
-static const drape_candidates *candidates_of(drape_contact *c, const drape_straight_path *straight,
-                                             double length, double stray, const drape_keep *keep,
-                                             drape_distances *away)
-{
-    const drape_candidates *candidates =
-        with_stray(drape_contact_valid_candidates(c, straight, away), stray, away);
-    if (candidates || keeps_least(keep) || length > DRAPE_LONGEST_SEARCH * c->mean_edge)
-        return candidates;
-    return with_stray(drape_contact_search(c, straight, away), stray, away);
-}
-
 double drape_contact_stray(const drape_collider *collider, double angle)
 {
     return collider->radius * angle * angle / 8; /* >= r (1 - cos(angle/2)) */
@@ -172,7 +158,13 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
               .exempt = c->exempt};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
-    const drape_candidates *candidates = candidates_of(c, straight, longest_move(c, &p), stray, keep, &away);
+    /* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are,
+     * at most. Searched if there are none; NULL for a path that is too long or on which only few pairs
+     * matter, or if there is no memory. */
+    const drape_candidates *candidates =
+        with_stray(drape_contact_valid_candidates(c, straight, &away), stray, &away);
+    if (!candidates && !keeps_least(keep) && !(longest_move(c, &p) > DRAPE_LONGEST_SEARCH * c->mean_edge))
+        candidates = with_stray(drape_contact_search(c, straight, &away), stray, &away);
     const drape_pair *pair;
     while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
         follow(&p, pair);
@@ -204,23 +196,6 @@ typedef struct own_path {
     double length;            /* [m] at most */
 } own_path;
 
-static own_path own_path_of(const drape_collider_pose *from, const drape_collider_pose *to,
-                            const drape_swing *swing, const double *x, const double *y)
-{
-    own_path along = {.swing = swing && swing->turns ? swing : NULL};
-    if (along.swing) {
-        memcpy(along.x, x, sizeof along.x);
-        vec3_sub(y, x, along.move);
-        along.length = drape_swing_speed(swing, along.x, along.move);
-        return along;
-    }
-    drape_pose_own(from, x, along.x);
-    drape_pose_own(to, y, along.move);
-    vec3_sub(along.move, along.x, along.move);
-    along.length = vec3_norm(along.move);
-    return along;
-}
-
 static double distance_on(const drape_collider *collider, const own_path *along, double t)
 {
     double at[3];
@@ -238,7 +213,17 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
                            const double *y, const drape_keep *keep)
 {
     const drape_collider *collider = &c->model->colliders[k];
-    const own_path along = own_path_of(from, to, swing, x, y);
+    own_path along = {.swing = swing && swing->turns ? swing : NULL};
+    if (along.swing) {
+        memcpy(along.x, x, sizeof along.x);
+        vec3_sub(y, x, along.move);
+        along.length = drape_swing_speed(swing, along.x, along.move);
+    } else {
+        drape_pose_own(from, x, along.x);
+        drape_pose_own(to, y, along.move);
+        vec3_sub(along.move, along.x, along.move);
+        along.length = vec3_norm(along.move);
+    }
     double t = 0, gap = distance_on(collider, &along, 0);
     const double least = drape_contact_least_gap(c),
                  end = drape_keep_gap(keep, least, gap, c->model->contact.distance);

@@ -301,17 +301,6 @@ static bool is_near_start(const drape_contact *c, const double *x)
     return true;
 }
 
-/* The path of a search for a configuration. In a step all pairs are searched from its beginning on, or that
- * of the step before, since that will be looked at, too. */
-static drape_straight_path path_to(drape_contact *c, const drape_configuration *at, bool in_step)
-{
-    const drape_straight_path here = {{*at, *at}};
-    const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
-    if (!in_step || drape_candidates_patch_serves(&c->step_candidates, &here) || !is_near_start(c, at->x))
-        return here;
-    return (drape_straight_path){{start, *at}};
-}
-
 drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
 {
     const drape_straight_path here = {{*at, *at}};
@@ -319,7 +308,11 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     drape_distances away;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (!candidates) {
-        const drape_straight_path path = path_to(c, at, in_step);
+        /* In a step all pairs are searched from its beginning on, or that of the step before, since that will
+         * be looked at, too. */
+        drape_straight_path path = here;
+        if (in_step && !drape_candidates_patch_serves(&c->step_candidates, &here) && is_near_start(c, at->x))
+            path.end[0] = (drape_configuration){.model = c->model, .x = c->start, .pose = c->start_pose};
         candidates = drape_contact_search(c, &path, &away);
     }
     if (!candidates)
@@ -398,21 +391,15 @@ drape_status drape_contact_lag(drape_contact *c)
     return DRAPE_OK;
 }
 
-/* Steps by powers of two, so that the least gaps of scenes that move do not change in every step. */
-static double next_power_of_two(double x)
-{
-    int exponent;
-    frexp(x, &exponent);
-    return x > 0 ? ldexp(1, exponent) : 0;
-}
-
 void drape_contact_set_rounding(drape_contact *c, const double *x)
 {
     double largest = 0;
+    int exponent; /* by powers of two, so that the least gaps of moving scenes do not change in every step */
     for (size_t i = 0; i < 3 * (size_t)c->broad.points; i++)
         largest = fmax(largest, fabs(x[i]));
     largest = drape_ranks_largest(c->ranks, largest);
-    c->broad.rounding = DRAPE_CLOSEST_ROUNDING * next_power_of_two(largest);
+    frexp(largest, &exponent);
+    c->broad.rounding = DRAPE_CLOSEST_ROUNDING * (largest > 0 ? ldexp(1, exponent) : 0);
 }
 
 /* Which pairs are inside. A pair that was added has another law, and so are its contacts. */

@@ -169,24 +169,6 @@ static void add_friction(drape_contact *c, const drape_active_contact *contact, 
     scatter(c, contact, local, g);
 }
 
-/* The dissipative part of the normal force, and friction that is not lagged. */
-static void add_dissipative(drape_contact *c, const drape_active_contact *contact,
-                            const drape_contact_law *law, double *g)
-{
-    const bool friction = law->friction > 0 && !c->model->contact.lagged;
-    double local[12], v[4][3];
-    if (!friction && !(law->damping > 0))
-        return;
-    drape_contact_velocities(c, contact, v);
-    const drape_normal normal = drape_normal_at(&contact->gap, law, v);
-    if (law->damping > 0) {
-        drape_restitution_force(&contact->gap, &normal, local);
-        scatter(c, contact, local, g);
-    }
-    if (friction)
-        add_friction(c, contact, law, drape_normal_force(&normal), v, g);
-}
-
 void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipative, double *g)
 {
     const double start = drape_clock_seconds();
@@ -201,13 +183,23 @@ void drape_contact_add_forces(drape_contact *c, bool conservative, bool dissipat
     for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, contact);
+        double local[12];
         if (conservative) {
-            double local[12];
             drape_contact_gradient(&contact->gap, &law, local);
             scatter(c, contact, local, g);
         }
-        if (dissipative)
-            add_dissipative(c, contact, &law, g);
+        const bool friction = law.friction > 0 && !c->model->contact.lagged;
+        if (!dissipative || (!friction && !(law.damping > 0)))
+            continue;
+        double v[4][3];
+        drape_contact_velocities(c, contact, v);
+        const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
+        if (law.damping > 0) {
+            drape_restitution_force(&contact->gap, &normal, local);
+            scatter(c, contact, local, g);
+        }
+        if (friction) /* that is not lagged */
+            add_friction(c, contact, &law, drape_normal_force(&normal), v, g);
     }
     const int32_t lagged_count = dissipative ? c->lagged_count : 0;
     for (int32_t i = 0; i < lagged_count; i++) {

@@ -306,34 +306,26 @@ void drape_contact_fix_friction(drape_contact *c, double weight, double share, c
 
 /* ---- Prediction ---- */
 
-/* What accelerates the gap: 1/sum(c_i^2/m_i) over the free nodes; 0: nothing does. */
-static double mass_of(const drape_contact *c, const drape_active_contact *contact)
-{
-    double compliance = 0;
-    for (int a = 0; a < contact->gap.closest.points; a++)
-        if (free_of(c->model, contact->pair.node[a]) >= 0)
-            compliance +=
-                contact->gap.closest.c[a] * contact->gap.closest.c[a] / c->model->mass[contact->pair.node[a]];
-    return compliance > 0 ? 1 / compliance : 0;
-}
-
 static double predict(const drape_contact *c, const drape_active_contact *contact, const double *p,
                       double weight, double mass_weight)
 {
     const drape_contact_law law = drape_contact_law_of(c, contact);
     const drape_gap *gap = &contact->gap;
-    double v[4][3], change = 0;
+    double v[4][3], change = 0, compliance = 0; /* a force accelerates the gap by sum(c_i^2/m_i) */
     drape_contact_velocities(c, contact, v);
     const drape_normal normal = drape_normal_at(gap, &law, v);
-    for (int a = 0; a < gap->closest.points; a++)
-        if (free_of(c->model, contact->pair.node[a]) >= 0)
-            change +=
-                gap->closest.c[a] * vec3_dot(gap->closest.normal, p + 3 * (size_t)contact->pair.node[a]);
+    for (int a = 0; a < gap->closest.points; a++) {
+        const int32_t node = contact->pair.node[a];
+        if (free_of(c->model, node) < 0)
+            continue;
+        change += gap->closest.c[a] * vec3_dot(gap->closest.normal, p + 3 * (size_t)node);
+        compliance += gap->closest.c[a] * gap->closest.c[a] / c->model->mass[node];
+    }
     const double stiffness = tangent_stiffness(gap, &law, weight, v, false) +
                              excess_stiffness(c, contact, &law, weight, false),
                  through = fmax(-change - gap->value, 0);
     return fmax(drape_normal_force(&normal) - stiffness * change, 0) +
-           mass_weight * mass_of(c, contact) * through;
+           mass_weight * (compliance > 0 ? 1 / compliance : 0) * through;
 }
 
 void drape_contact_predict(drape_contact *c, const double *p, double weight, double mass_weight)
@@ -412,34 +404,29 @@ static void list_near(void *user, const drape_pair *pair)
         list->complete = list->complete && add_coupling(c, pair, 4);
 }
 
-/* Pairs that are half as far from becoming active as candidates have their blocks when a pattern is made:
- * those of others stay 0, and cost more in each factorisation of a pile than the patterns that they save.
- * They come from the candidates if these include them all: a pattern depends on the positions alone. */
-static void visit_near(drape_contact *c, listing *list)
-{
-    const double start = drape_clock_seconds(), margin = list->margin;
-    const drape_configuration now = drape_contact_configuration(c);
-    const drape_straight_path here = {{now, now}};
-    drape_distances away;
-    drape_candidate_cursor cursor = {0};
-    const drape_pair *pair;
-    const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
-    if (candidates && drape_candidates_farthest(candidates, &away) + 0.5 * margin <= candidates->margin) {
-        away.beyond = margin;
-        while ((pair = drape_candidates_next(candidates, &away, &cursor)))
-            list_near(list, pair);
-        return;
-    }
-    drape_candidates_find(&c->broad, &here, 0.5 * margin, false, NULL, list_near, list);
-    c->search_seconds += drape_clock_seconds() - start;
-}
-
 int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
 {
     const double start = drape_clock_seconds();
     listing list = {.contact = c, .margin = c->step_candidates.margin / 2, .complete = true};
+    const drape_configuration now = drape_contact_configuration(c);
+    const drape_straight_path here = {{now, now}};
+    drape_distances away;
     c->coupling_count = 0;
-    visit_near(c, &list);
+    /* Pairs that are half as far from becoming active as candidates have their blocks when a pattern is made:
+     * those of others stay 0, and cost more in each factorisation of a pile than the patterns that they save.
+     * They come from the candidates if these include them all: a pattern depends on the positions alone. */
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
+    if (candidates &&
+        drape_candidates_farthest(candidates, &away) + 0.5 * list.margin <= candidates->margin) {
+        drape_candidate_cursor cursor = {0};
+        const drape_pair *pair;
+        away.beyond = list.margin;
+        while ((pair = drape_candidates_next(candidates, &away, &cursor)))
+            list_near(&list, pair);
+    } else {
+        drape_candidates_find(&c->broad, &here, 0.5 * list.margin, false, NULL, list_near, &list);
+        c->search_seconds += drape_clock_seconds() - start;
+    }
     c->seconds += drape_clock_seconds() - start;
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_active_contact *contact = &c->lagged[i].contact;

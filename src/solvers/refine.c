@@ -106,53 +106,6 @@ static void find_residual(drape_refine *w, drape_add_product *product, const voi
         w->error = 0;
 }
 
-/* Makes the last vector of the basis orthogonal to the others and of length 1 (modified Gram-Schmidt); h:
- * its column of the Hessenberg matrix. */
-static void orthogonalise(const drape_refine *w, int j, double *h)
-{
-    const int64_t n = w->n;
-    double *v = w->basis + (j + 1) * n;
-    for (int i = 0; i <= j; i++) {
-        const double *u = w->basis + i * n;
-        h[i] = dot(w, u, v);
-        for (int64_t k = 0; k < n; k++)
-            v[k] -= h[i] * u[k];
-    }
-    h[j + 1] = norm(w, v);
-    for (int64_t k = 0; k < n && h[j + 1] > 0; k++)
-        v[k] /= h[j + 1];
-}
-
-/* Applies the earlier rotations to column j of the Hessenberg matrix, and a new one that makes it
- * triangular. */
-static void rotate(int j, double *h, double *c, double *s, double *g)
-{
-    for (int i = 0; i < j; i++) {
-        const double kept = h[i];
-        h[i] = c[i] * kept + s[i] * h[i + 1];
-        h[i + 1] = c[i] * h[i + 1] - s[i] * kept;
-    }
-    const double length = sqrt(h[j] * h[j] + h[j + 1] * h[j + 1]);
-    c[j] = length > 0 ? h[j] / length : 1;
-    s[j] = length > 0 ? h[j + 1] / length : 0;
-    h[j] = length;
-    g[j + 1] = -s[j] * g[j];
-    g[j] *= c[j];
-}
-
-/* Adds to x the combination of the corrections with the least residual. */
-static void combine(const drape_refine *w, int count, double (*h)[VECTORS + 1], double *g, double *x)
-{
-    const int64_t n = w->n;
-    for (int j = count - 1; j >= 0; j--) {
-        for (int i = j + 1; i < count; i++)
-            g[j] -= h[i][j] * g[i];
-        g[j] = h[j][j] != 0 ? g[j] / h[j][j] : 0;
-        for (int64_t k = 0; k < n; k++)
-            x[k] += g[j] * w->correction[j * n + k];
-    }
-}
-
 /* One cycle of GMRES: corrects x until the residual is expected to be below `target`. */
 static void correct(drape_refine *w, drape_preconditioner *apply, void *factors, drape_add_product *product,
                     const void *owner, double target, double *x)
@@ -163,18 +116,44 @@ static void correct(drape_refine *w, drape_preconditioner *apply, void *factors,
     g[0] = norm(w, w->residual);
     for (int64_t k = 0; k < n; k++)
         w->basis[k] = w->residual[k] / g[0];
-    while (j < VECTORS && fabs(g[j]) > target) {
-        double *v = w->basis + (j + 1) * n, *z = w->correction + j * n;
+    for (; j < VECTORS && fabs(g[j]) > target; j++) {
+        double *v = w->basis + (j + 1) * n, *z = w->correction + j * n, *column = h[j];
         apply(factors, w->basis + j * n, z);
         for (int64_t k = 0; k < n; k++)
             v[k] = 0;
         product(owner, 1, z, v);
-        orthogonalise(w, j, h[j]);
-        rotate(j, h[j], c, s, g);
-        j++;
+        /* The new vector becomes orthogonal to the others and of length 1 (modified Gram-Schmidt). */
+        for (int i = 0; i <= j; i++) {
+            const double *u = w->basis + i * n;
+            column[i] = dot(w, u, v);
+            for (int64_t k = 0; k < n; k++)
+                v[k] -= column[i] * u[k];
+        }
+        column[j + 1] = norm(w, v);
+        for (int64_t k = 0; k < n && column[j + 1] > 0; k++)
+            v[k] /= column[j + 1];
+        /* The earlier rotations of its column of the Hessenberg matrix, and one that makes it triangular. */
+        for (int i = 0; i < j; i++) {
+            const double kept = column[i];
+            column[i] = c[i] * kept + s[i] * column[i + 1];
+            column[i + 1] = c[i] * column[i + 1] - s[i] * kept;
+        }
+        const double length = sqrt(column[j] * column[j] + column[j + 1] * column[j + 1]);
+        c[j] = length > 0 ? column[j] / length : 1;
+        s[j] = length > 0 ? column[j + 1] / length : 0;
+        column[j] = length;
+        g[j + 1] = -s[j] * g[j];
+        g[j] *= c[j];
     }
     w->iterations += j;
-    combine(w, j, h, g, x);
+    /* The combination of the corrections with the least residual. */
+    for (int a = j - 1; a >= 0; a--) {
+        for (int i = a + 1; i < j; i++)
+            g[a] -= h[i][a] * g[i];
+        g[a] = h[a][a] != 0 ? g[a] / h[a][a] : 0;
+        for (int64_t k = 0; k < n; k++)
+            x[k] += g[a] * w->correction[a * n + k];
+    }
 }
 
 drape_status drape_refine_solve(drape_refine *w, drape_preconditioner *apply, void *factors,
