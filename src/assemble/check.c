@@ -307,6 +307,7 @@ static double kinetic_error(const checker *c, const drape_term *term, double *ar
 static void check_elements(checker *c, const drape_term *term)
 {
     errors max = {0};
+    const char *const name = term->ops->entry.name;
     int32_t stride = term->elements.count / SAMPLE + 1;
     for (c->progress = drape_term_is_timed(term) ? 0 : 1; c->progress <= 1; c->progress += 0.5) {
         /* The smallest scales of an element's errors: MIN_SCALE of the term's largest derivatives, over
@@ -323,21 +324,17 @@ static void check_elements(checker *c, const drape_term *term)
             max = largest_of(max, compare_element(c, term, e, min));
     }
     if (term->ops->dissipation) {
-        report(c, term->ops->entry.name, "force by position", max.hessian, HESSIAN_LIMIT);
-        report(c, term->ops->entry.name, "force by velocity", max.velocity, HESSIAN_LIMIT);
+        report(c, name, "force by position", max.hessian, HESSIAN_LIMIT);
+        report(c, name, "force by velocity", max.velocity, HESSIAN_LIMIT);
         if (term->ops->kinetic) {
-            report(c, term->ops->entry.name, "energy of motion by position", kinetic_error(c, term, c->x),
-                   HESSIAN_LIMIT);
-            report(c, term->ops->entry.name, "energy of motion by velocity", kinetic_error(c, term, c->v),
-                   HESSIAN_LIMIT);
+            report(c, name, "energy of motion by position", kinetic_error(c, term, c->x), HESSIAN_LIMIT);
+            report(c, name, "energy of motion by velocity", kinetic_error(c, term, c->v), HESSIAN_LIMIT);
         }
         return;
     }
-    report(c, term->ops->entry.name, term->ops->measure ? "gradient of measure" : "gradient", max.gradient,
-           GRADIENT_LIMIT);
-    report(c, term->ops->entry.name, term->ops->measure ? "Hessian of measure" : "Hessian", max.hessian,
-           HESSIAN_LIMIT);
-    report(c, term->ops->entry.name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
+    report(c, name, term->ops->measure ? "gradient of measure" : "gradient", max.gradient, GRADIENT_LIMIT);
+    report(c, name, term->ops->measure ? "Hessian of measure" : "Hessian", max.hessian, HESSIAN_LIMIT);
+    report(c, name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
 }
 
 /* Net force and net torque of a term with a measure or of a seam, over the sum of magnitudes: internal
@@ -345,6 +342,7 @@ static void check_elements(checker *c, const drape_term *term)
 static void check_invariance(checker *c, int32_t t)
 {
     const drape_term *term = &c->model->terms[t];
+    const char *const name = term->ops->entry.name;
     const drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .t = c->t};
     double net[6] = {0}, scale = 0, size = 0;
     size_t n = (size_t)c->model->node_count;
@@ -360,10 +358,9 @@ static void check_invariance(checker *c, int32_t t)
             size = fmax(size, fabs(x[k]));
         }
     }
-    report(c, term->ops->entry.name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
+    report(c, name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
     if (!term->anchored)
-        report(c, term->ops->entry.name, "net torque", ratio(largest(net + 3, 3), scale * size),
-               INVARIANCE_LIMIT);
+        report(c, name, "net torque", ratio(largest(net + 3, 3), scale * size), INVARIANCE_LIMIT);
 }
 
 /* ---- The assembled Jacobian ---- */
@@ -611,6 +608,7 @@ static drape_status check_terms(drape_context *ctx, checker *c)
     drape_status status = DRAPE_OK;
     for (int32_t t = 0; t < c->model->term_count && !(status = drape_check_cancel(ctx)); t++) {
         const drape_term *term = &c->model->terms[t];
+        const char *const name = term->ops->entry.name;
         if (term->ops->law) {
             /* At one state, with a difference along each of the law's arguments. */
             const double k = 2.385, at = 0.117, moves = -0.731, h = DIFFERENCE_STEP;
@@ -620,13 +618,11 @@ static drape_status check_terms(drape_context *ctx, checker *c)
             term->ops->law(term->params, 5, stiffness, strain, rate, f, fs, fr, e);
             double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
             double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
-            report(c, term->ops->entry.name, "force by strain", ratio(fabs(by_strain - fs[0]), scale),
-                   HESSIAN_LIMIT);
-            report(c, term->ops->entry.name, "force by rate", ratio(fabs(by_rate - fr[0]), scale),
-                   HESSIAN_LIMIT);
+            report(c, name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
+            report(c, name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
             if (!term->ops->dissipative)
-                report(c, term->ops->entry.name, "force of energy",
-                       ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale), GRADIENT_LIMIT);
+                report(c, name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
+                       GRADIENT_LIMIT);
         } else
             check_elements(c, term);
         if (term->ops->measure || (term->seam >= 0 && term->ops->energy && !term->ops->external))

@@ -414,7 +414,8 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
         add(s, term, &s->blocks[0], &all, to);
         for (int32_t i = 0; to->node_energy && !work && i < s->blocks[0].count; i++)
             for (int a = 0; a < n; a++)
-                to->node_energy[node[n * (s->blocks[0].first + i) + a]] += s->blocks[0].energy[i] / n;
+                to->node_energy[node[(size_t)n * (size_t)(s->blocks[0].first + i) + (size_t)a]] +=
+                    s->blocks[0].energy[i] / n;
         for (int32_t i = 0; energy && !work && i < s->blocks[0].count; i++)
             if (is_counted(term, s->blocks[0].first + i))
                 sum += s->blocks[0].energy[i];

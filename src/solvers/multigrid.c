@@ -707,7 +707,6 @@ LANES_INLINE void add_correction(const level *l, const int size, const double *c
 }
 
 static void cycle(drape_multigrid *m, int k, const double *b, double *x);
-static void cycle_twice(drape_multigrid *m, int k);
 
 /* Two cycles on level k for its own b. With s an eigenvalue of a cycle times A, at most 1, they are the
  * polynomial (1 - T(s)) / (1 + e) / s of the cycle, T that of Chebyshev of degree 2 with T(0) = 1 and
@@ -747,22 +746,18 @@ static void cycle_twice(drape_multigrid *m, int k)
         l->x[i] = l->sum[i] - factor * l->x[i];
 }
 
-static void fetch_copies(level *l)
-{
-    const border *b = l->border;
-    b->ranks->copy(b->ranks, b->rows, l->x, l->x + scalars(&l->a), (size_t)l->a.size * sizeof *l->x);
-}
-
 LANES_INLINE void cycle_rows(drape_multigrid *m, int k, const int size, const double *b, double *x)
 {
     const level *l = &m->level[k];
     sweep_forwards(l, size, b, x, l->r);
     if (k + 1 < m->count) {
-        restrict_residual(l, size, l->r, &m->level[k + 1]);
+        level *next = &m->level[k + 1];
+        restrict_residual(l, size, l->r, next);
         cycle_twice(m, k + 1);
         if (l->border && !(k + 2 == m->count && m->whole.multigrid))
-            fetch_copies(&m->level[k + 1]);
-        add_correction(l, size, m->level[k + 1].x, x);
+            next->border->ranks->copy(next->border->ranks, next->border->rows, next->x,
+                                      next->x + scalars(&next->a), (size_t)next->a.size * sizeof *next->x);
+        add_correction(l, size, next->x, x);
     }
     sweep_backwards(l, size, b, x, l->r);
 }
