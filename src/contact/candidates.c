@@ -3,8 +3,8 @@
 
 #include "base/lanes.h"
 #include "base/vec3.h"
-#include "contact/bound.h"
 #include "contact/list.h"
+#include "contact/pair.h"
 
 #include <string.h>
 

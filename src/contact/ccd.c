@@ -4,7 +4,7 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
-#include "contact/bound.h"
+#include "contact/pair.h"
 
 #include <float.h>
 #include <string.h>

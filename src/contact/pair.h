@@ -125,4 +125,18 @@ typedef struct drape_swings {
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
                                 const drape_swings *swings, const drape_keep *keep, double limit);
 
+/* Lower bounds of the distance between the two pieces, cheaper than their closest points. */
+
+/* Bounds the distance of the pieces, not surfaces, on their straight path from x to y, by the axes through
+ * their centres at either end; y NULL: at x. May be negative. x, y: (points x 3). */
+double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y);
+
+/* Whether that bound is at least a distance > 0, without its square roots: of the pairs of a search most
+ * are so far apart. */
+bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double *y, double distance);
+
+/* Bounds how much the distance of the pieces changes between x and y: the sum of the largest moves of a point
+ * of each, without their common motion. */
+double drape_bound_change(const drape_pair *pair, const double *x, const double *y);
+
 #endif

@@ -9,7 +9,6 @@
 #include "base/vec3.h"
 #include "contact/list.h"
 #include "geometry/intersect.h"
-#include "geometry/orient.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -3,7 +3,7 @@
  * collider.
  *
  * An edge passes through a triangle if its ends lie strictly on different sides of the triangle's plane,
- * and it meets the triangle, sides and corners included. The signs are exact (geometry/orient.h), so the
+ * and it meets the triangle, sides and corners included. The signs are exact (drape_orient), so the
  * answer is that for the positions as doubles, however near the parts are; parts that only touch do not
  * count.
  */
@@ -11,6 +11,12 @@
 #define DRAPE_GEOMETRY_INTERSECT_H
 
 #include "model/model.h"
+
+/* On which side of a plane a point lies, exactly. The sign is that of the real numbers that the
+ * coordinates are, whatever the rounding, as long as each is 0 or of a magnitude between 1e-90 and 1e90.
+ * The sign of the volume of the tetrahedron a b c d: 1 if a, b, c are counterclockwise seen from d, -1 if
+ * clockwise, 0 if the four points lie in a plane. */
+int drape_orient(const double *a, const double *b, const double *c, const double *d);
 
 /* Edges and triangles over positions x (any count x 3) [m], which must be finite. */
 typedef struct drape_surface {

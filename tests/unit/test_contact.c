@@ -4,7 +4,6 @@
  * mollifier of nearly parallel edges. Step fractions that are reported as free are free.
  */
 #include "contact/barrier.h"
-#include "contact/bound.h"
 #include "contact/friction.h"
 #include "contact/pair.h"
 #include "contact/predict.h"

@@ -1,7 +1,6 @@
 /* test_intersect.c: edges that pass through triangles are counted exactly, wherever they are and however near
  * to a side; signs of volumes are exact. */
 #include "geometry/intersect.h"
-#include "geometry/orient.h"
 #include "support/suite.h"
 
 #include <math.h>
