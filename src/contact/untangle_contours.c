@@ -350,7 +350,7 @@ static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int sid
     if (place.triangle < 0)
         return;
     const int32_t *corner = tree->node + 3 * (size_t)place.triangle;
-    /* Whether a place on a triangle is on the boundary of its sheet. */
+    /* A place on the boundary of the other sheet does not tell on which side the node is. */
     for (int a = 0; a < 3; a++)
         if (place.weights[a] <= 0 && is_boundary(&u->sheets, corner[(a + 1) % 3], corner[(a + 2) % 3]))
             return;

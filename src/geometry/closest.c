@@ -141,34 +141,6 @@ void drape_closest_reduce(drape_closest *at, int which[4])
 
 /* ---- Derivatives ---- */
 
-/* Computes the inverse of G = T . T. */
-static void invert(double t[2][3], int params, double inverse[2][2])
-{
-    double a = vec3_dot(t[0], t[0]), b = vec3_dot(t[0], t[1]), c = vec3_dot(t[1], t[1]);
-    if (params == 1) {
-        inverse[0][0] = 1 / a;
-        return;
-    }
-    double det = a * c - b * b;
-    inverse[0][0] = c / det;
-    inverse[1][1] = a / det;
-    inverse[0][1] = inverse[1][0] = -b / det;
-}
-
-/* Adds dt/dx. */
-static void derive_params(double t[2][3], const drape_closest *at, double shift[2][12])
-{
-    double inverse[2][2];
-    if (at->params == 0)
-        return;
-    invert(t, at->params, inverse);
-    for (int k = 0; k < at->params; k++)
-        for (int l = 0; l < at->params; l++)
-            for (int i = 0; i < 3 * at->points; i++)
-                shift[k][i] -= inverse[k][l] * (at->dcdt[l][i / 3] * at->distance * at->normal[i % 3] +
-                                                at->c[i / 3] * t[l][i % 3]);
-}
-
 void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_derivatives *derivatives)
 {
     double t[2][3] = {{0}}, shift[2][12] = {{0}}, scale = at->distance > 0 ? 1 / at->distance : 0;
@@ -179,7 +151,21 @@ void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest
             vec3_sub(x[i], x[0], e);
             vec3_add_scaled(at->dcdt[k][i], e, t[k]);
         }
-    derive_params(t, at, shift);
+    const double a = vec3_dot(t[0], t[0]), b = vec3_dot(t[0], t[1]), c = vec3_dot(t[1], t[1]);
+    double inverse[2][2] = {{0}}; /* of G = T . T */
+    if (at->params == 1)
+        inverse[0][0] = 1 / a;
+    else if (at->params == 2) {
+        const double det = a * c - b * b;
+        inverse[0][0] = c / det;
+        inverse[1][1] = a / det;
+        inverse[0][1] = inverse[1][0] = -b / det;
+    }
+    for (int k = 0; k < at->params; k++) /* dt/dx */
+        for (int l = 0; l < at->params; l++)
+            for (int i = 0; i < 3 * at->points; i++)
+                shift[k][i] -= inverse[k][l] * (at->dcdt[l][i / 3] * at->distance * at->normal[i % 3] +
+                                                at->c[i / 3] * t[l][i % 3]);
     for (int i = 0; i < 3 * at->points; i++) {
         double dp[3] = {0}, along = 0;
         dp[i % 3] = at->c[i / 3];

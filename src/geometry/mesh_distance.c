@@ -163,17 +163,6 @@ static void offer_triangle(const drape_collider_shape *s, const drape_mesh_dista
     }
 }
 
-static double squared_distance(const drape_box *b, const double *x)
-{
-    double sum = 0;
-    for (int k = 0; k < 3; k++) {
-        const double below = b->low[k] - x[k], above = x[k] - b->high[k];
-        const double beyond = below > 0 ? below : above > 0 ? above : 0; /* fmax may be a call */
-        sum += beyond * beyond;
-    }
-    return sum;
-}
-
 /* A branch that has not been visited yet. */
 typedef struct pending {
     int32_t index;
@@ -182,7 +171,14 @@ typedef struct pending {
 
 static pending pending_at(const drape_mesh_distance *mesh, int32_t index, const double *x)
 {
-    return (pending){index, squared_distance(&mesh->boxes.branches[index].box, x)};
+    const drape_box *b = &mesh->boxes.branches[index].box;
+    pending at = {.index = index};
+    for (int k = 0; k < 3; k++) {
+        const double below = b->low[k] - x[k], above = x[k] - b->high[k];
+        const double beyond = below > 0 ? below : above > 0 ? above : 0; /* fmax may be a call */
+        at.squared += beyond * beyond;
+    }
+    return at;
 }
 
 static nearest find_nearest(const drape_mesh_distance *mesh, const drape_collider_shape *s, const double *x)

@@ -158,6 +158,16 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Adds a row to the `count` rows below j in m->stack, unless it is among them. Returns their number. */
+static int32_t add_row(maker *m, int32_t j, int32_t row, int32_t count)
+{
+    if (row <= j || m->mark[row] == j)
+        return count;
+    m->mark[row] = j;
+    m->stack[count] = row;
+    return count + 1;
+}
+
 /* Collects in m->stack the rows below j: those of column j of the matrix and those of the fronts that end
  * in children of j. Returns their number. */
 static int32_t gather_rows(maker *m, int32_t j)
@@ -165,21 +175,11 @@ static int32_t gather_rows(maker *m, int32_t j)
     const drape_pattern *p = m->pattern;
     const int32_t column = m->e->order[j];
     int32_t count = 0;
-    for (int32_t k = p->block_start[column]; k < p->block_start[column + 1]; k++) {
-        const int32_t i = m->e->place[p->block_row[k]];
-        if (i > j && m->mark[i] != j) {
-            m->mark[i] = j;
-            m->stack[count++] = i;
-        }
-    }
+    for (int32_t k = p->block_start[column]; k < p->block_start[column + 1]; k++)
+        count = add_row(m, j, m->e->place[p->block_row[k]], count);
     for (int32_t f = m->head[j]; f >= 0; f = m->next[f])
-        for (int32_t k = 0; k < m->length[f]; k++) {
-            const int32_t i = m->rows[f][k];
-            if (i > j && m->mark[i] != j) {
-                m->mark[i] = j;
-                m->stack[count++] = i;
-            }
-        }
+        for (int32_t k = 0; k < m->length[f]; k++)
+            count = add_row(m, j, m->rows[f][k], count);
     return count;
 }
 
@@ -216,13 +216,8 @@ static bool find_fronts(maker *m)
                 close_front(m, f);
         }
         int32_t count = gather_rows(m, j);
-        for (int32_t k = 0; linked && k < m->length[f]; k++) {
-            const int32_t i = m->rows[f][k];
-            if (i > j && m->mark[i] != j) {
-                m->mark[i] = j;
-                m->stack[count++] = i;
-            }
-        }
+        for (int32_t k = 0; linked && k < m->length[f]; k++)
+            count = add_row(m, j, m->rows[f][k], count);
         if (linked && count == before - 1) {
             before = count;
             continue;
@@ -310,7 +305,7 @@ static drape_status make(maker *m)
     e->order = drape_arena_take(m->arena, n, sizeof *e->order);
     e->place = drape_arena_take(m->arena, n, sizeof *e->place);
     e->first = drape_arena_take(m->arena, n + 1, sizeof *e->first);
-    if (!(!drape_arena_status(&m->scratch) && !drape_arena_status(m->arena)))
+    if (drape_arena_status(&m->scratch) || drape_arena_status(m->arena))
         return DRAPE_E_MEMORY;
     if (!order(m))
         return drape_fail_memory(m->arena->ctx, row_bytes(m->pattern));

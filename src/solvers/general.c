@@ -151,11 +151,9 @@ static bool scale(drape_general *g, const double *values, bool symmetric)
     /* g->scaled (nonzeros) = R A C; g->row and g->column (n) are the diagonals of R and C, equal if the
      * matrix is symmetric. False if a row or a column is zero: the matrix is singular. */
     const drape_pattern *p = g->fronts->pattern;
-    double *scaled = g->scaled;
-    double *work = g->refine.basis;
     const size_t n = (size_t)p->n;
-    double *row_step = work, *column_step = work + n, *row_largest = work + 2 * n,
-           *column_largest = work + 3 * n;
+    double *scaled = g->scaled, *work = g->refine.basis, *row_step = work, *column_step = work + n,
+           *row_largest = work + 2 * n, *column_largest = work + 3 * n;
     bool done = false, regular = true;
     memcpy(scaled, values, (size_t)p->nonzeros * sizeof *scaled);
     for (size_t i = 0; i < n; i++)

@@ -46,19 +46,6 @@ static void grow(const drape_graph *g, int32_t seed, int32_t id, int spacing, fr
     }
 }
 
-/* Each next node that is `spacing` or more edges away from all seeds becomes one. Returns the number of
- * seeds. */
-static int32_t aggregate(const drape_graph *g, int spacing, front *f)
-{
-    int32_t seeds = 0;
-    for (int32_t i = 0; i < g->count; i++)
-        f->distance[i] = INT_MAX;
-    for (int32_t i = 0; i < g->count; i++)
-        if (f->distance[i] >= spacing)
-            grow(g, i, seeds++, spacing, f);
-    return seeds;
-}
-
 /* ---- Functions ---- */
 
 /* The values at each node, as they are smoothed. */
@@ -178,7 +165,12 @@ drape_status drape_prolong_build(drape_arena *arena, const drape_graph *g, int s
     *out = (drape_prolong){.fine = g->count};
     drape_status status = drape_arena_status(&scratch);
     if (!status) {
-        out->coarse = aggregate(g, spacing, &f);
+        /* Each next node that is `spacing` or more edges away from all seeds becomes one. */
+        for (int32_t i = 0; i < g->count; i++)
+            f.distance[i] = INT_MAX;
+        for (int32_t i = 0; i < g->count; i++)
+            if (f.distance[i] >= spacing)
+                grow(g, i, out->coarse++, spacing, &f);
         make_functions(g, spacing, &f, t);
         status = pack(arena, &t[0], out);
     }
@@ -239,12 +231,6 @@ static int32_t meet_row(const drape_prolong *p, const drape_graph *g, const int3
     return count;
 }
 
-static void unmark(int32_t *mark, int32_t count)
-{
-    for (int32_t i = 0; i < count; i++)
-        mark[i] = -1;
-}
-
 drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *p, const drape_graph *g,
                                 int32_t **out_start, int32_t **out_neighbor)
 {
@@ -263,13 +249,13 @@ drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *p, cons
     for (int32_t i = 0; i < p->fine; i++)
         for (int32_t k = p->start[i]; k < p->start[i + 1]; k++)
             node[start[p->column[k] + 1]++] = i;
-    unmark(mark, p->coarse);
+    memset(mark, -1, (size_t)p->coarse * sizeof *mark);
     for (int32_t a = 0; a < p->coarse; a++)
         rows[a + 1] = rows[a] + meet_row(p, g, start, node, a, mark, NULL);
     int32_t *columns = drape_arena_take(arena, (size_t)rows[p->coarse], sizeof *columns);
     if (!columns)
         return DRAPE_E_MEMORY;
-    unmark(mark, p->coarse);
+    memset(mark, -1, (size_t)p->coarse * sizeof *mark);
     for (int32_t a = 0; a < p->coarse; a++)
         meet_row(p, g, start, node, a, mark, columns + rows[a]);
     *out_start = rows;
