@@ -3,7 +3,6 @@
  */
 #include "contact/untangle.h"
 
-#include "base/vec3.h"
 #include "colliders/deformed.h"
 #include "contact/list.h"
 #include "contact/untangle_parts.h"
@@ -31,11 +30,8 @@ static double between(const double *x, const int32_t *pair)
 
 static double area_of(const drape_untangler *u, int32_t face)
 {
-    const int32_t *t = u->model->triangle + 3 * (size_t)face;
-    double v[3], w[3], n[3];
-    vec3_sub(u->x + 3 * (size_t)t[1], u->x + 3 * (size_t)t[0], v);
-    vec3_sub(u->x + 3 * (size_t)t[2], u->x + 3 * (size_t)t[0], w);
-    vec3_cross(v, w, n);
+    double n[3];
+    drape_untangle_area(u->x, u->model->triangle + 3 * (size_t)face, n);
     return vec3_norm(n) / 2;
 }
 

@@ -8,7 +8,6 @@
 
 #include "base/elementary.h"
 #include "base/pi.h"
-#include "base/vec3.h"
 #include "geometry/intersect.h"
 
 #include <string.h>
@@ -128,11 +127,8 @@ static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *
         return;
     for (int32_t f = 0; f < m->triangle_count; f++)
         if (u->piece[m->triangle[3 * (size_t)f]] == piece) {
-            const int32_t *node = m->triangle + 3 * (size_t)f;
-            double v[3], w[3], n[3];
-            vec3_sub(u->x + 3 * (size_t)node[1], u->x + 3 * (size_t)node[0], v);
-            vec3_sub(u->x + 3 * (size_t)node[2], u->x + 3 * (size_t)node[0], w);
-            vec3_cross(v, w, n);
+            double n[3];
+            drape_untangle_area(u->x, m->triangle + 3 * (size_t)f, n);
             vec3_add_scaled(1, n, normal);
         }
     for (int k = 0; k < 3; k++)
@@ -282,10 +278,8 @@ static void note_piercing(void *user, int32_t edge, int32_t triangle)
     const int32_t *node = p->u->model->triangle + 3 * (size_t)triangle;
     const double *a = p->x + 3 * (size_t)p->edge[2 * (size_t)edge],
                  *b = p->x + 3 * (size_t)p->edge[2 * (size_t)edge + 1], *o = p->u->x + 3 * (size_t)node[0];
-    double v[3], w[3], n[3], oa[3], ob[3];
-    vec3_sub(p->u->x + 3 * (size_t)node[1], o, v);
-    vec3_sub(p->u->x + 3 * (size_t)node[2], o, w);
-    vec3_cross(v, w, n);
+    double n[3], oa[3], ob[3];
+    drape_untangle_area(p->u->x, node, n);
     vec3_sub(a, o, oa);
     vec3_sub(b, o, ob);
     const double above = fabs(vec3_dot(n, oa)), below = fabs(vec3_dot(n, ob)),
@@ -395,7 +389,5 @@ drape_status drape_untangle_bodies(drape_untangler *u)
         push_faces(u, c);
         status = push_pierced(u, c);
     }
-    if (status)
-        return status;
-    return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
+    return status ? status : u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
 }

@@ -6,7 +6,6 @@
  */
 #include "contact/untangle_parts.h"
 
-#include "base/vec3.h"
 #include "contact/list.h"
 #include "geometry/intersect.h"
 

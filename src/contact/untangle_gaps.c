@@ -4,7 +4,6 @@
  */
 #include "contact/untangle_parts.h"
 
-#include "base/vec3.h"
 #include "contact/list.h"
 
 #include <stdlib.h>
@@ -81,13 +80,10 @@ static void normal_at(const drape_untangler *u, int32_t node, double n[3])
     for (int32_t a = s->edges.first[node]; a < s->edges.first[node + 1]; a++)
         for (int k = 0; k < 2; k++) {
             const int32_t face = s->edge_triangle[2 * (size_t)s->edges.element[a] + (size_t)k];
-            double v[3], w[3], own[3];
+            double own[3];
             if (face < 0)
                 continue;
-            const int32_t *t = s->triangle + 3 * (size_t)face;
-            vec3_sub(u->x + 3 * (size_t)t[1], u->x + 3 * (size_t)t[0], v);
-            vec3_sub(u->x + 3 * (size_t)t[2], u->x + 3 * (size_t)t[0], w);
-            vec3_cross(v, w, own);
+            drape_untangle_area(u->x, s->triangle + 3 * (size_t)face, own);
             vec3_add_scaled(1, own, n);
         }
 }

@@ -7,6 +7,7 @@
 #ifndef DRAPE_CONTACT_UNTANGLE_PARTS_H
 #define DRAPE_CONTACT_UNTANGLE_PARTS_H
 
+#include "base/vec3.h"
 #include "contact/broad_phase.h"
 #include "contact/sort_pairs.h"
 #include "contact/untangle.h"
@@ -122,6 +123,15 @@ static inline double drape_untangle_stride(const drape_untangler *u)
 static inline double drape_untangle_wanted(const drape_untangler *u, double distance)
 {
     return u->def->gap * distance;
+}
+
+/* Twice the area of a triangle, along its normal. */
+static inline void drape_untangle_area(const double *x, const int32_t *node, double n[3])
+{
+    double v[3], w[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], v);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], w);
+    vec3_cross(v, w, n);
 }
 
 /* Finds all crossings of sheets, and adds the bounds that take them apart, and the passages. */
