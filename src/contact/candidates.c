@@ -289,19 +289,14 @@ static double distance_from(const drape_candidates *c, int set, const drape_conf
     return largest;
 }
 
-static bool has_stale(const drape_candidates *c)
-{
-    bool found = false;
-    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
-        found = found || c->stale[i];
-    return found;
-}
-
 drape_distances drape_candidates_distances(const drape_candidates *c, const drape_straight_path *path)
 {
     const bool moves = path->end[1].x != path->end[0].x || path->end[1].pose != path->end[0].pose;
     drape_distances away = {.set = {INFINITY}};
-    for (int i = 0; i < c->sets && !has_stale(c); i++) {
+    bool stale = false;
+    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
+        stale = stale || c->stale[i];
+    for (int i = 0; i < c->sets && !stale; i++) {
         away.set[i] = distance_from(c, i, &path->end[0], false);
         if (!isinf(away.set[i]) && moves)
             away.set[i] = fmax(away.set[i], distance_from(c, i, &path->end[1], true));

@@ -168,21 +168,6 @@ static int32_t add_row(maker *m, int32_t j, int32_t row, int32_t count)
     return count + 1;
 }
 
-/* Collects in m->stack the rows below j: those of column j of the matrix and those of the fronts that end
- * in children of j. Returns their number. */
-static int32_t gather_rows(maker *m, int32_t j)
-{
-    const drape_pattern *p = m->pattern;
-    const int32_t column = m->e->order[j];
-    int32_t count = 0;
-    for (int32_t k = p->block_start[column]; k < p->block_start[column + 1]; k++)
-        count = add_row(m, j, m->e->place[p->block_row[k]], count);
-    for (int32_t f = m->head[j]; f >= 0; f = m->next[f])
-        for (int32_t k = 0; k < m->length[f]; k++)
-            count = add_row(m, j, m->rows[f][k], count);
-    return count;
-}
-
 /* Ends front f: its rows are those of its first column that lie beyond its last column. It is listed as a
  * child of the column above. */
 static void close_front(maker *m, int32_t f)
@@ -215,7 +200,16 @@ static bool find_fronts(maker *m)
             if (!linked)
                 close_front(m, f);
         }
-        int32_t count = gather_rows(m, j);
+        /* m->stack gets the rows below j: those of column j of the matrix and those of the fronts that end
+         * in children of j. */
+        const drape_pattern *p = m->pattern;
+        const int32_t column = m->e->order[j];
+        int32_t count = 0;
+        for (int32_t i = p->block_start[column]; i < p->block_start[column + 1]; i++)
+            count = add_row(m, j, m->e->place[p->block_row[i]], count);
+        for (int32_t n = m->head[j]; n >= 0; n = m->next[n])
+            for (int32_t i = 0; i < m->length[n]; i++)
+                count = add_row(m, j, m->rows[n][i], count);
         for (int32_t k = 0; linked && k < m->length[f]; k++)
             count = add_row(m, j, m->rows[f][k], count);
         if (linked && count == before - 1) {

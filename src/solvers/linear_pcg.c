@@ -68,12 +68,6 @@ static drape_status create_fallback(fallback *f)
     return status;
 }
 
-/* The owner's report; the bytes that libraries took. */
-static drape_linear_report fallback_report(const fallback *f, const drape_linear_ops *owner)
-{
-    return (drape_linear_report){.ops = owner, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
-}
-
 extern const drape_linear_ops drape_linear_pcg;
 
 typedef struct pcg_state {
@@ -252,7 +246,9 @@ static size_t bytes(const void *state)
 
 static void report(const void *state, drape_linear_report *out)
 {
-    *out = fallback_report(&((const pcg_state *)state)->fallback, &drape_linear_pcg);
+    const fallback *f = &((const pcg_state *)state)->fallback;
+    *out = (drape_linear_report){
+        .ops = &drape_linear_pcg, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
 }
 
 const drape_linear_ops drape_linear_pcg = {
