@@ -16,10 +16,13 @@ typedef struct choice {
     bool quiet; /* no warnings */
 } choice;
 
-/* Former methods, and those that scenes which name them are run by. */
+/* Former methods and controllers, and those that scenes which name them are run by. */
 static const struct {
+    const drape_registry *registry;
     const char *name, *by;
-} replaced[] = {{"cvode", "ida"}, {"generalized_alpha", "bdf2"}};
+} replaced[] = {{&drape_integrator_registry, "cvode", "ida"},
+                {&drape_integrator_registry, "generalized_alpha", "bdf2"},
+                {&drape_controller_registry, "iterations", "halving"}};
 
 static bool is_listed(const char *const *names, size_t count, const char *name)
 {
@@ -79,12 +82,11 @@ static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, c
     return status;
 }
 
-/* The name of the method to run by, which is another one if that of this name is gone. */
+/* The name of the entry to run by, which is another one if that of this name is gone. */
 static const char *present_name(drape_context *ctx, const choice *c, const char *at, const char *name)
 {
-    for (size_t i = 0; c->registry == &drape_integrator_registry && i < sizeof replaced / sizeof *replaced;
-         i++)
-        if (strcmp(replaced[i].name, name) == 0) {
+    for (size_t i = 0; i < sizeof replaced / sizeof *replaced; i++)
+        if (c->registry == replaced[i].registry && strcmp(replaced[i].name, name) == 0) {
             if (!c->quiet)
                 drape_log(ctx, DRAPE_LOG_WARNING, "%s: there is no \"%s\" any more; \"%s\" runs in its place",
                           at, name, replaced[i].by);

@@ -307,8 +307,8 @@ static bool iterates_long(drape_sim *sim, char *text, size_t size)
         integrator->steady_state || sim->chosen.controller->own_steps || !(iterations(&s) > TOO_MANY))
         return false;
     snprintf(text, size,
-             "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt, or the "
-             "controller \"iterations\", is more accurate there and often takes hardly longer",
+             "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt is more accurate "
+             "there and often takes hardly longer",
              integrator->entry.name, iterations(&s));
     return true;
 }

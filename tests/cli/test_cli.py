@@ -299,6 +299,9 @@ def test_former_methods():
         equal(result.returncode, 0, result.stderr)
         equal(result.stderr, f'warning: /integrator/method: there is no "{name}" any more; "{by}" runs in its place\n' + expected.stderr)
         equal(result.stdout.splitlines()[:-1], expected.stdout.splitlines()[:-1])  # the last line has times
+    result = drape("run", "scene.json", "--set", "/controller/type=iterations")
+    equal(result.returncode, 0, result.stderr)
+    assert 'warning: /controller/type: there is no "iterations" any more; "halving" runs in its place\n' in result.stderr, result.stderr
     refused("run", "scene.json", "--integrator", "cvod", says='there is no integrator "cvod"')
 
 

@@ -152,28 +152,6 @@ START_TEST(halving_stops_where_the_time_stands_still)
 }
 END_TEST
 
-/* Steps of 8 ms of a nominal step of 16 ms: halved above 8 iterations, kept, doubled below 3, never below a
- * quarter of the nominal step nor above it. The size of a step that is shorter already is kept. */
-START_TEST(iterations_choose_the_step)
-{
-    static const struct {
-        double h;
-        int iterations;
-        double next;
-    } cases[] = {{8e-3, 9, 4e-3},  {8e-3, 8, 8e-3},  {8e-3, 3, 8e-3},   {8e-3, 2, 16e-3},
-                 {4e-3, 50, 4e-3}, {1e-3, 50, 1e-3}, {16e-3, 0, 16e-3}, {12e-3, 1, 16e-3}};
-    const drape_controller_ops *ops = controller_named("iterations");
-    double values[DRAPE_MAX_PARAMS];
-    defaults(ops, values);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        drape_step_info info = {.reason = "converged", .iterations = cases[i].iterations};
-        drape_trial trial = {.h = cases[i].h, .dt = 16e-3, .info = &info};
-        ck_assert_int_eq(ops->judge(values, &trial), DRAPE_ACCEPT);
-        ck_assert_double_eq(trial.h_next, cases[i].next);
-    }
-}
-END_TEST
-
 SUITE("controllers", entries_are_well_formed, good_steps_are_accepted,
       failures_that_no_smaller_step_cures_keep_their_status, endless_failure_ends, fixed_never_halves,
-      halving_stops_at_dt_min, halving_stops_where_the_time_stands_still, iterations_choose_the_step)
+      halving_stops_at_dt_min, halving_stops_where_the_time_stands_still)
