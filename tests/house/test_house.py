@@ -12,7 +12,8 @@ ARROWS = re.compile(r"^([a-z]+) -> ([a-z ]+)$", re.M)
 NUMBER = r"\(?(-?[0-9.]+(?:[eE][-+]?[0-9]+)?)\)?"
 NAMED = re.compile(rf"^\s*#\s*define\s+([A-Z][A-Z0-9_]*)\s+{NUMBER}\s*$|^\s*([A-Z][A-Z0-9_]*)\s*=\s*{NUMBER}\s*,?\s*$")
 REASON = re.compile(r"^\| (\w+) \| ([\w.]+) \| `(\w+)` \| `([^`]+)` \| \S.* \|$", re.M)
-NUMBERED = ("assemble", "colliders", "compile", "contact", "geometry", "solvers", "terms")  # folders of src whose numbers have a reason
+# folders of src that decide a motion: their numbers have a reason
+NUMBERED = ("assemble", "colliders", "compile", "contact", "control", "geometry", "integrators", "nonlinear", "realtime", "sim", "solvers", "terms")
 
 
 def files_of(root):

@@ -119,7 +119,8 @@ START_TEST(runs_end_at_their_ends)
 END_TEST
 
 /* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the
- * method, and of the trapezoidal rule in two powers, which falls with the tolerance. */
+ * method, and of the trapezoidal rule in two powers, which falls with the tolerance: rtol 1e-3 and 1e-7 of the
+ * scene's size in each of the 10 to 100 steps that dissipate most. */
 START_TEST(the_energy_balance_is_kept)
 {
     for (int i = 0; drape_integrators[i]; i++) {
@@ -136,7 +137,8 @@ START_TEST(the_energy_balance_is_kept)
         }
         printf("# %s: remainder %.3g and %.3g of what is dissipated\n", drape_integrators[i]->entry.name,
                remainder[0], remainder[1]);
-        assert_below(remainder[1], 0.1 * remainder[0]);
+        assert_below(remainder[0], 1e-2);
+        assert_below(remainder[1], 1e-4);
     }
 }
 END_TEST
