@@ -103,36 +103,32 @@ static double local_error(const double *values, const drape_trial *trial, int32_
     return p.points == 1 && isfinite(error) ? first_error(error, sqrt(positions / count)) : error;
 }
 
-static drape_verdict reject(const double *values, drape_trial *trial, double error, int32_t node)
-{
-    const double allowed = drape_pow(error, -1.0 / (trial->order + 1)),
-                 factor = isnan(error) ? 0.5 : fmax(DRAPE_STEP_CUT, DRAPE_STEP_SAFETY * allowed);
-    trial->status = DRAPE_RETRY_REJECTED;
-    trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
-    trial->info->diagnostic =
-        (drape_diagnostic){.what = "local error / tolerance",
-                           .term = "",
-                           .element = -1,
-                           .node = {node, -1, -1, -1},
-                           .cloth = node >= 0 ? drape_model_cloth_of(trial->model, node) : -1,
-                           .value = error,
-                           .limit = 1};
-    drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
-    double proposed = fmax(values[PARAM_DT_MIN], factor * trial->h);
-    /* otherwise the halved step, which changes the time, is used */
-    if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t)
-        trial->h_next = proposed;
-    return verdict;
-}
-
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status && !trial->info->usable)
         return drape_halve(values[PARAM_DT_MIN], trial);
     int32_t node;
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
-    if (!(error <= 1)) /* also rejects NaN */
-        return reject(values, trial, error, node);
+    if (!(error <= 1)) { /* also rejects NaN */
+        const double allowed = drape_pow(error, -1.0 / (trial->order + 1)),
+                     factor = isnan(error) ? 0.5 : fmax(DRAPE_STEP_CUT, DRAPE_STEP_SAFETY * allowed);
+        trial->status = DRAPE_RETRY_REJECTED;
+        trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        trial->info->diagnostic =
+            (drape_diagnostic){.what = "local error / tolerance",
+                               .term = "",
+                               .element = -1,
+                               .node = {node, -1, -1, -1},
+                               .cloth = node >= 0 ? drape_model_cloth_of(trial->model, node) : -1,
+                               .value = error,
+                               .limit = 1};
+        drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
+        double proposed = fmax(values[PARAM_DT_MIN], factor * trial->h);
+        /* otherwise the halved step, which changes the time, is used */
+        if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t)
+            trial->h_next = proposed;
+        return verdict;
+    }
     const double factor = drape_step_factor(error, last > 0 ? last : error, trial->order + 1);
     trial->scratch[SCRATCH_LAST_ERROR] = fmax(error, DRAPE_LEAST_ERROR);
     trial->h_next = fmax(values[PARAM_DT_MIN], fmin(MAX_GROWTH, factor) * trial->h);

@@ -58,18 +58,6 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* The last attempt was accepted if the state that it computed is the one that this step starts from. */
-static void settle_past(bdf2_state *s, const drape_state *in)
-{
-    if (s->made.known && s->made.t == in->t) {
-        past swap = s->past;
-        s->past = s->made;
-        s->made = swap;
-    }
-    s->made.known = false;
-    s->past.known = s->past.known && s->past.t == in->t;
-}
-
 static void set_equation(bdf2_state *s, const drape_state *in, double a, double w)
 {
     drape_implicit *c = &s->common;
@@ -111,33 +99,19 @@ static void expect(bdf2_state *s, const drape_state *in, double h, double r)
     drape_implicit_carry(&s->common, in, h, s->past.dv, s->past.h);
 }
 
-/* Computes what the next step needs if this one is accepted. */
-static void remember(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
-{
-    drape_implicit *c = &s->common;
-    s->made.t = out->t;
-    s->made.h = h;
-    s->made.known = true;
-    for (size_t i = 0; i < c->equation.nodes; i++) {
-        s->made.dx[i] = out->x[i] - in->x[i];
-        s->made.dv[i] = out->v[i] - in->v[i];
-    }
-    drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
-    for (size_t i = 0; s->made.dp && i < c->equation.nodes; i++)
-        s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
-    if (!c->history)
-        return;
-    drape_implicit_measure(c, out->t, out->x, s->made.dq);
-    for (int64_t i = 0; i < c->equation.model->measure_count; i++)
-        s->made.dq[i] -= s->q0[i];
-}
-
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
     bdf2_state *s = state;
     const drape_step_equation *e = &s->common.equation;
-    settle_past(s, in);
+    /* The last attempt was accepted if the state that it computed is the one that this step starts from. */
+    if (s->made.known && s->made.t == in->t) {
+        past swap = s->past;
+        s->past = s->made;
+        s->made = swap;
+    }
+    s->made.known = false;
+    s->past.known = s->past.known && s->past.t == in->t;
     double r = s->past.known ? h / s->past.h : 0;
     double a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
     drape_implicit_base(&s->common, in, out->t, h);
@@ -149,7 +123,23 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return status;
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);
-    remember(s, in, out, h);
+    /* Computes what the next step needs if this one is accepted. */
+    const drape_implicit *c = &s->common;
+    s->made.t = out->t;
+    s->made.h = h;
+    s->made.known = true;
+    for (size_t i = 0; i < c->equation.nodes; i++) {
+        s->made.dx[i] = out->x[i] - in->x[i];
+        s->made.dv[i] = out->v[i] - in->v[i];
+    }
+    drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
+    for (size_t i = 0; s->made.dp && i < c->equation.nodes; i++)
+        s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
+    if (c->history) {
+        drape_implicit_measure(c, out->t, out->x, s->made.dq);
+        for (int64_t i = 0; i < c->equation.model->measure_count; i++)
+            s->made.dq[i] -= s->q0[i];
+    }
     drape_implicit_audit_stage(&s->common, in->x, out->x, in->t, h, e->probe, info);
     return status;
 }

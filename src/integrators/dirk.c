@@ -162,21 +162,6 @@ static int predict(sunrealtype t, N_Vector predicted, void *user)
     return 0;
 }
 
-static bool configure(drape_first_order *f)
-{
-    void *m = f->memory;
-    DRAPE_ARKODE_QUIET(m);
-    return !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
-           !ARKStepSetTableNum(m, methods[order_of((dirk_state *)f)].table, ARKODE_ERK_NONE) &&
-           !ARKStepSetLinearSolver(m, f->linear->shell.solver, f->linear->shell.matrix) &&
-           !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
-           !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
-           !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
-           !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
-           !ARKStepSetNonlinConvCoef(m, DRAPE_NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
-           !ARKStepSetMaxStep(m, drape_first_order_max_step(f));
-}
-
 static bool create_arkode(drape_first_order *f)
 {
     dirk_state *s = (dirk_state *)f;
@@ -193,7 +178,19 @@ static bool create_arkode(drape_first_order *f)
     N_VConst(0, s->before);
     N_VConst(0, s->rate_before);
     f->memory = ARKStepCreate(NULL, rhs, 0, f->y, f->sun);
-    return f->memory && configure(f);
+    void *m = f->memory;
+    if (!m)
+        return false;
+    DRAPE_ARKODE_QUIET(m);
+    return !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
+           !ARKStepSetTableNum(m, methods[order_of(s)].table, ARKODE_ERK_NONE) &&
+           !ARKStepSetLinearSolver(m, f->linear->shell.solver, f->linear->shell.matrix) &&
+           !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
+           !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
+           !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
+           !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
+           !ARKStepSetNonlinConvCoef(m, DRAPE_NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
+           !ARKStepSetMaxStep(m, drape_first_order_max_step(f));
 }
 
 static void destroy_vectors(drape_first_order *f)

@@ -241,16 +241,6 @@ static void measure_powers(drape_first_order *s, double t, double powers[2])
         s->ranks->sum(s->ranks, powers, 2);
 }
 
-/* Adds the work, by the trapezoidal rule. */
-static void audit(drape_first_order *s, const drape_state *in, const drape_state *out, drape_step_info *info)
-{
-    double after[2];
-    measure_powers(s, out->t, after);
-    info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
-    info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
-    memcpy(s->powers, after, sizeof after);
-}
-
 /* ---- A step ---- */
 
 /* After a failure, reports the degenerate element or the node whose force is not finite; otherwise the node
@@ -427,7 +417,12 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     out->t = t;
     info->h = t - in->t;
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
-    audit(s, in, out, info);
+    /* Adds the work, by the trapezoidal rule. */
+    double after[2];
+    measure_powers(s, out->t, after);
+    info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
+    info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
+    memcpy(s->powers, after, sizeof after);
     status = drape_system_agree(s->system);
     if (status)
         return status;
@@ -473,43 +468,6 @@ void drape_first_order_restart(void *state, const drape_state *from)
 
 /* ---- Creation and destruction ---- */
 
-static void create_arrays(drape_first_order *s)
-{
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    s->x = drape_arena_take(s->arena, nodes, sizeof *s->x);
-    s->v = drape_arena_take(s->arena, nodes, sizeof *s->v);
-    s->g = drape_arena_take(s->arena, nodes, sizeof *s->g);
-    s->reduced = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->reduced);
-    s->mass = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->mass);
-    for (int64_t i = 0; s->mass && i < s->n; i++)
-        s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
-    for (int k = 0; s->ranks && k < 2; k++)
-        s->with_copies[k] = drape_arena_take(s->arena, (size_t)s->model->block_count, 3 * sizeof(double));
-    if (!s->model->has_dissipation)
-        return;
-    s->damping =
-        drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
-    s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
-}
-
-/* Derived defaults, and the weights that follow from them. */
-static void set_tolerances(drape_first_order *s)
-{
-    const double rtol = s->values[DRAPE_FIRST_ORDER_RTOL];
-    drape_derive_tolerances(s->model, rtol, &s->values[DRAPE_FIRST_ORDER_ATOL_X],
-                            &s->values[DRAPE_FIRST_ORDER_ATOL_V]);
-    s->size = s->speed = NAN;
-    drape_derive_tolerances(s->model, 1, &s->size, &s->speed);
-    if (isnan(s->values[DRAPE_FIRST_ORDER_ORDER]))
-        s->values[DRAPE_FIRST_ORDER_ORDER] =
-            rtol >= DRAPE_FIRST_ORDER_TIGHT ? s->solver->loose_order : s->solver->tight_order;
-    double *w = N_VGetArrayPointer(s->weights);
-    for (int64_t i = 0; i < s->n; i++) {
-        w[i] = s->values[DRAPE_FIRST_ORDER_ATOL_X];
-        w[s->n + i] = s->values[DRAPE_FIRST_ORDER_ATOL_V];
-    }
-}
-
 static drape_status create_vectors(drape_first_order *s)
 {
     s->y = drape_vector_new(s->ranks, 2 * s->n, s->sun);
@@ -540,7 +498,21 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
     s->reached = s->from = NAN;
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, (size_t)solver->param_count * sizeof *values);
-    create_arrays(s);
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    s->x = drape_arena_take(s->arena, nodes, sizeof *s->x);
+    s->v = drape_arena_take(s->arena, nodes, sizeof *s->v);
+    s->g = drape_arena_take(s->arena, nodes, sizeof *s->g);
+    s->reduced = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->reduced);
+    s->mass = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->mass);
+    for (int64_t i = 0; s->mass && i < s->n; i++)
+        s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
+    for (int k = 0; s->ranks && k < 2; k++)
+        s->with_copies[k] = drape_arena_take(s->arena, (size_t)s->model->block_count, 3 * sizeof(double));
+    if (s->model->has_dissipation) {
+        s->damping =
+            drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
+        s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
+    }
     drape_reserve reserve = {.used = false};
     drape_status status = drape_arena_status(arena);
     if (!status)
@@ -551,8 +523,22 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
     if (!status && s->n > 0)
         status = create_vectors(s);
     status = drape_ranks_agree(s->ranks, ctx, status);
-    if (!status && s->n > 0)
-        set_tolerances(s);
+    if (!status && s->n > 0) {
+        /* Derived defaults, and the weights that follow from them. */
+        const double rtol = s->values[DRAPE_FIRST_ORDER_RTOL];
+        drape_derive_tolerances(s->model, rtol, &s->values[DRAPE_FIRST_ORDER_ATOL_X],
+                                &s->values[DRAPE_FIRST_ORDER_ATOL_V]);
+        s->size = s->speed = NAN;
+        drape_derive_tolerances(s->model, 1, &s->size, &s->speed);
+        if (isnan(s->values[DRAPE_FIRST_ORDER_ORDER]))
+            s->values[DRAPE_FIRST_ORDER_ORDER] =
+                rtol >= DRAPE_FIRST_ORDER_TIGHT ? s->solver->loose_order : s->solver->tight_order;
+        double *w = N_VGetArrayPointer(s->weights);
+        for (int64_t i = 0; i < s->n; i++) {
+            w[i] = s->values[DRAPE_FIRST_ORDER_ATOL_X];
+            w[s->n + i] = s->values[DRAPE_FIRST_ORDER_ATOL_V];
+        }
+    }
     if (!status && s->n > 0)
         status = drape_sun_linear_create(
             arena, s->sun, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),

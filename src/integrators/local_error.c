@@ -47,16 +47,6 @@ double drape_local_error_stop(const drape_local_error *c, const drape_state *in,
 
 /* ---- The size of a step ---- */
 
-/* The last attempt was accepted if the state that it computed is the one that this step starts from. */
-static void settle(drape_local_error *c, const drape_state *in)
-{
-    if (c->made.end == in->t)
-        c->past = c->made;
-    else if (c->past.end != in->t)
-        c->past = (drape_step_record){.end = NAN};
-    c->made.end = NAN;
-}
-
 /* Root mean square over the free DOFs, relative to the size of the scene and its speed, of the rate of the
  * state: how often per second it moves by its size. */
 static double rate_of_motion(const drape_local_error *c, const drape_state *in, const double *g)
@@ -83,7 +73,12 @@ drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in
                                      drape_local_attempt *a, drape_step_info *info)
 {
     const double left = a->stop - in->t;
-    settle(c, in);
+    /* The last attempt was accepted if the state that it computed is the one that this step starts from. */
+    if (c->made.end == in->t)
+        c->past = c->made;
+    else if (c->past.end != in->t)
+        c->past = (drape_step_record){.end = NAN};
+    c->made.end = NAN;
     a->again = c->tried == in->t;
     c->tried = in->t;
     if (isnan(c->past.end))
@@ -146,21 +141,6 @@ static double propose(const drape_local_error *c, const drape_local_attempt *a, 
     return next > a->h && next < c->kept_growth * a->h ? a->h : next;
 }
 
-static drape_status reject(const drape_local_error *c, const drape_local_attempt *a, double error,
-                           int32_t node, drape_step_info *info)
-{
-    info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
-    info->diagnostic = (drape_diagnostic){.what = "local error / tolerance",
-                                          .term = "",
-                                          .element = -1,
-                                          .node = {node, -1, -1, -1},
-                                          .cloth = node >= 0 ? drape_model_cloth_of(c->model, node) : -1,
-                                          .value = error,
-                                          .limit = 1};
-    info->retry = fmax(elementary(c, a->h, error), DRAPE_STEP_CUT * a->h);
-    return DRAPE_RETRY_REJECTED;
-}
-
 drape_status drape_local_error_test(drape_local_error *c, const drape_local_attempt *a, const double *ex,
                                     const double *ev, drape_step_info *info)
 {
@@ -170,8 +150,18 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
         info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return DRAPE_RETRY_NONFINITE;
     }
-    if (error > 1)
-        return reject(c, a, error, node, info);
+    if (error > 1) {
+        info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        info->diagnostic = (drape_diagnostic){.what = "local error / tolerance",
+                                              .term = "",
+                                              .element = -1,
+                                              .node = {node, -1, -1, -1},
+                                              .cloth = node >= 0 ? drape_model_cloth_of(c->model, node) : -1,
+                                              .value = error,
+                                              .limit = 1};
+        info->retry = fmax(elementary(c, a->h, error), DRAPE_STEP_CUT * a->h);
+        return DRAPE_RETRY_REJECTED;
+    }
     if (!drape_step_moves(a->h, c->size, c->speed, a->t1 == a->stop, &c->tiny)) {
         info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
         return DRAPE_E_STEP_TOO_SMALL;

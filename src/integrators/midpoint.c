@@ -14,18 +14,6 @@
 
 #include <string.h>
 
-/* x1 = x0 + 2 d and v1 = 2 vm - v0; pinned nodes at the end of the step, with their mean velocity in it. */
-static void write_state(const drape_implicit *s, const drape_state *in, double h, drape_state *out)
-{
-    const drape_step_equation *e = &s->equation;
-    drape_implicit_place(s, in, out->t, h, out->x, out->v);
-    for (size_t i = 0; i < e->dofs; i++) {
-        size_t at = drape_step_equation_at(e, i);
-        out->x[at] += 2 * s->d[i];
-        out->v[at] = 4 * s->d[i] / h - in->v[at];
-    }
-}
-
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -41,7 +29,14 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->error *= 2; /* d is that to the middle of the step */
     if (status)
         return status;
-    write_state(s, in, h, out);
+    /* x1 = x0 + 2 d and v1 = 2 vm - v0; pinned nodes at the end of the step, with their mean velocity in
+     * it. */
+    drape_implicit_place(s, in, out->t, h, out->x, out->v);
+    for (size_t i = 0; i < e->dofs; i++) {
+        size_t at = drape_step_equation_at(e, i);
+        out->x[at] += 2 * s->d[i];
+        out->v[at] = 4 * s->d[i] / h - in->v[at];
+    }
     drape_implicit_audit(s, in, out, info);
     return status;
 }

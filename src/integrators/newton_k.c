@@ -92,24 +92,6 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* Keeps the velocities with which steps began. A second attempt at the same step has the same past. */
-static void remember(newton_k *s, const drape_state *in, double end)
-{
-    bool again = in->t == s->past_time[0], follows = in->t == s->past_end;
-    s->past_end = end;
-    if (again)
-        return;
-    double *oldest = s->past[PAST - 1];
-    for (int k = PAST - 1; k > 0; k--) {
-        s->past[k] = s->past[k - 1];
-        s->past_time[k] = follows ? s->past_time[k - 1] : NAN;
-    }
-    s->touched = follows && s->touches;
-    s->past[0] = oldest;
-    s->past_time[0] = in->t;
-    memcpy(s->past[0], in->v, s->common.equation.nodes * sizeof *in->v);
-}
-
 /* How alike the last two changes of velocity are, 0 to 1; 1 where only one is known. */
 static double correlation(const newton_k *s, const drape_state *in)
 {
@@ -161,7 +143,20 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
     e->pins_ahead = drape_implicit_pins_ahead(&s->common, in, h);
-    remember(s, in, out->t);
+    /* Keeps the velocities with which steps began. A second attempt at the same step has the same past. */
+    bool again = in->t == s->past_time[0], follows = in->t == s->past_end;
+    s->past_end = out->t;
+    if (!again) {
+        double *oldest = s->past[PAST - 1];
+        for (int k = PAST - 1; k > 0; k--) {
+            s->past[k] = s->past[k - 1];
+            s->past_time[k] = follows ? s->past_time[k - 1] : NAN;
+        }
+        s->touched = follows && s->touches;
+        s->past[0] = oldest;
+        s->past_time[0] = in->t;
+        memcpy(s->past[0], in->v, e->nodes * sizeof *in->v);
+    }
     guess(s, in, h);
     const int least = s->cheap ? 1 : (int)s->values[PARAM_ITERATIONS];
     const drape_newton_effort effort = {.least = least,

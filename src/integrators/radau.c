@@ -330,45 +330,26 @@ static drape_status prepare_matrix(radau_state *s, double h)
 
 typedef enum guess { EXTRAPOLATED, UNIFORM, REST, GUESSES } guess;
 
-/* The stages' first velocities, and positions that belong to them. */
-static void set_guess(radau_state *s, guess kind, double h)
-{
-    const polynomial *p = &s->next, *last = &s->last;
-    for (int i = 0; i < STAGES; i++) {
-        double w[STAGES + 1];
-        if (kind == EXTRAPOLATED)
-            weights_of_velocity(1 + fraction[i] * h / last->h, w);
-        for (int64_t k = 0; k < s->n; k++)
-            s->rate[i][k] = kind == EXTRAPOLATED ? w[0] * last->v[k] + w[1] * last->stage[0][k] +
-                                                       w[2] * last->stage[1][k] + w[3] * last->stage[2][k]
-                            : kind == UNIFORM ? p->v[k]
-                                              : 0;
-    }
-    combine(s->n, coefficients, h, s->rate, s->z);
-}
-
 /* Finds a guess in which nothing passes through anything else, and -F there. */
 static drape_status guess_stages(radau_state *s, double h)
 {
     drape_status status = DRAPE_RETRY_NONLINEAR;
     for (int kind = extrapolates(s, h) ? EXTRAPOLATED : UNIFORM; status > 0 && kind < GUESSES; kind++) {
-        set_guess(s, (guess)kind, h);
+        /* The stages' first velocities, and positions that belong to them. */
+        const polynomial *p = &s->next, *last = &s->last;
+        for (int i = 0; i < STAGES; i++) {
+            double w[STAGES + 1];
+            if (kind == EXTRAPOLATED)
+                weights_of_velocity(1 + fraction[i] * h / last->h, w);
+            for (int64_t k = 0; k < s->n; k++)
+                s->rate[i][k] = kind == EXTRAPOLATED ? w[0] * last->v[k] + w[1] * last->stage[0][k] +
+                                                           w[2] * last->stage[1][k] + w[3] * last->stage[2][k]
+                                : kind == UNIFORM ? p->v[k]
+                                                  : 0;
+        }
+        combine(s->n, coefficients, h, s->rate, s->z);
         status = evaluate_stages(s, h);
     }
-    return status;
-}
-
-/* Replaces -F in `force` by the corrections of Z; DRAPE_RETRY_LINEAR without factors. */
-static drape_status correct(radau_state *s)
-{
-    const int64_t n = s->n;
-    double *const rhs[STAGES] = {s->rhs, s->rhs + n, s->rhs + 2 * n};
-    double *const solution[STAGES] = {s->correction, s->correction + n, s->correction + 2 * n};
-    combine(n, to_eigenvectors, 1, s->force, rhs);
-    drape_status status = drape_radau_matrix_solve(&s->matrix, rhs[0], solution[0]);
-    if (!status)
-        status = drape_radau_matrix_solve_complex(&s->matrix, rhs[1], LINEAR_TOLERANCE, solution[1]);
-    combine(n, eigenvectors, 1, solution, s->force);
     return status;
 }
 
@@ -402,7 +383,15 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
     for (int k = 1; !status && k <= MAX_ITERATIONS; k++) {
         info->iterations++;
         s->work.newton_iterations++;
-        status = correct(s);
+        /* Replaces -F in `force` by the corrections of Z; DRAPE_RETRY_LINEAR without factors. */
+        const int64_t n = s->n;
+        double *const rhs[STAGES] = {s->rhs, s->rhs + n, s->rhs + 2 * n};
+        double *const solution[STAGES] = {s->correction, s->correction + n, s->correction + 2 * n};
+        combine(n, to_eigenvectors, 1, s->force, rhs);
+        status = drape_radau_matrix_solve(&s->matrix, rhs[0], solution[0]);
+        if (!status)
+            status = drape_radau_matrix_solve_complex(&s->matrix, rhs[1], LINEAR_TOLERANCE, solution[1]);
+        combine(n, eigenvectors, 1, solution, s->force);
         if (status)
             break;
         const double norm = move(s, h);
@@ -489,30 +478,6 @@ static drape_status estimate_error(radau_state *s, const drape_local_attempt *a)
     return solve_error(s, a->h, g);
 }
 
-/* ---- Work of dissipation, pins and colliders ---- */
-
-/* Adds h times the powers of dissipative forces, and of the forces that move pins and colliders. */
-static void add_work(radau_state *s, const drape_point *point, double h, drape_step_info *info)
-{
-    if (s->dissipated)
-        info->dissipated += h * drape_instant_dissipation(s->system, point, s->dissipated);
-    if (!drape_system_is_driven(s->system))
-        return;
-    drape_system_force(s->system, point, s->g);
-    info->pin_work += h * drape_instant_driving(s->system, point, s->g);
-}
-
-/* The work in a step of size h, whose end is left in s->x and s->v. */
-static void audit(radau_state *s, double h, double end, drape_step_info *info)
-{
-    const double t0 = s->span[0];
-    for (int i = 0; i < STAGES; i++) {
-        const double time = i == STAGES - 1 ? end : t0 + fraction[i] * h;
-        const drape_point point = place(s, time, s->next.x, s->z[i], s->rate[i]);
-        add_work(s, &point, quadrature[i] * h, info);
-    }
-}
-
 /* ---- A step ---- */
 
 /* After a failure, reports the degenerate element or the node whose force is not finite, or the pair that
@@ -583,16 +548,6 @@ static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
     } while (true);
 }
 
-/* Bounds what the error test proposed by what the iteration is likely to manage. */
-static void bound_next_step(radau_state *s, double h)
-{
-    double *proposed = &s->control.made.proposed;
-    if (s->hardest > 0)
-        *proposed = fmin(*proposed, h * AIM / s->hardest);
-    *proposed = fmin(*proposed, s->ceiling);
-    s->ceiling *= RELAXATION;
-}
-
 /* Solves the stages and tests the error. */
 static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_step_info *info)
 {
@@ -607,23 +562,15 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
     }
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST && !s->touches;
-    if (!status)
-        bound_next_step(s, a->h);
-    return status;
-}
-
-/* The stages become the polynomial of the last step. */
-static void keep_polynomial(radau_state *s, double h)
-{
-    const polynomial kept = s->last;
-    for (int i = 0; i < STAGES; i++) {
-        double *stage = s->next.stage[i];
-        s->next.stage[i] = s->rate[i];
-        s->rate[i] = stage;
+    if (!status) {
+        /* Bounds what the error test proposed by what the iteration is likely to manage. */
+        double *proposed = &s->control.made.proposed;
+        if (s->hardest > 0)
+            *proposed = fmin(*proposed, a->h * AIM / s->hardest);
+        *proposed = fmin(*proposed, s->ceiling);
+        s->ceiling *= RELAXATION;
     }
-    s->next.h = h;
-    s->last = s->next;
-    s->next = kept;
+    return status;
 }
 
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
@@ -645,10 +592,30 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         status = attempt(s, &a, info);
     if (status)
         return status;
-    audit(s, a.h, a.t1, info);
+    /* The work of dissipative forces, pins and colliders; the end of the step is left in s->x and s->v. */
+    for (int i = 0; i < STAGES; i++) {
+        const double time = i == STAGES - 1 ? a.t1 : s->span[0] + fraction[i] * a.h;
+        const drape_point point = place(s, time, s->next.x, s->z[i], s->rate[i]);
+        const double weight = quadrature[i] * a.h;
+        if (s->dissipated)
+            info->dissipated += weight * drape_instant_dissipation(s->system, &point, s->dissipated);
+        if (drape_system_is_driven(s->system)) {
+            drape_system_force(s->system, &point, s->g);
+            info->pin_work += weight * drape_instant_driving(s->system, &point, s->g);
+        }
+    }
     memcpy(out->x, s->x, nodes * sizeof *out->x);
     memcpy(out->v, s->v, nodes * sizeof *out->v);
-    keep_polynomial(s, a.h);
+    /* The stages become the polynomial of the last step. */
+    const polynomial kept = s->last;
+    for (int i = 0; i < STAGES; i++) {
+        double *stage = s->next.stage[i];
+        s->next.stage[i] = s->rate[i];
+        s->rate[i] = stage;
+    }
+    s->next.h = a.h;
+    s->last = s->next;
+    s->next = kept;
     out->t = s->reached = a.t1;
     info->h = a.h;
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
@@ -675,8 +642,22 @@ static void take_polynomial(drape_arena *arena, size_t n, polynomial *p)
         p->stage[i] = drape_arena_take(arena, n, sizeof *p->stage[i]);
 }
 
-static void take_arrays(radau_state *s)
+/* 0.1 r^(2/3) for a bound of r relative to the scene. */
+static double raise_bound(double bound, double size)
 {
+    return 0.1 * size * drape_pow(bound / size, 2.0 / 3);
+}
+
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
+{
+    radau_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    *s = (radau_state){.arena = arena,
+                       .system = system,
+                       .model = drape_system_model(system),
+                       .motion = drape_system_motion(system)};
+    s->n = 3 * (int64_t)s->model->free_count;
     const size_t nodes = 3 * (size_t)s->model->node_count, n = (size_t)s->n;
     double **const of_nodes[] = {&s->x, &s->v, &s->g}, **const of_dofs[] = {&s->g0, &s->error_x, &s->error_v};
     for (int i = 0; i < 3; i++) {
@@ -692,16 +673,6 @@ static void take_arrays(radau_state *s)
     take_polynomial(s->arena, n, &s->next);
     if (s->model->has_dissipation)
         s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
-}
-
-/* 0.1 r^(2/3) for a bound of r relative to the scene. */
-static double raise_bound(double bound, double size)
-{
-    return 0.1 * size * drape_pow(bound / size, 2.0 / 3);
-}
-
-static void set_tolerances(radau_state *s, const double *values)
-{
     drape_local_error *control = &s->control;
     drape_local_error_init(s->system, values, ERROR_POWER, control);
     control->kept_growth = DRAPE_STEP_KEPT;
@@ -711,20 +682,6 @@ static void set_tolerances(radau_state *s, const double *values)
     const double share = values[PARAM_NEWTON_SHARE];
     s->newton_bound = fmax(10 * DBL_EPSILON / bound, /* RADAU5: no smaller error can be asked for */
                            isnan(share) ? fmin(NEWTON_SHARE, sqrt(bound)) : share);
-}
-
-static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
-{
-    radau_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
-        return DRAPE_E_MEMORY;
-    *s = (radau_state){.arena = arena,
-                       .system = system,
-                       .model = drape_system_model(system),
-                       .motion = drape_system_motion(system)};
-    s->n = 3 * (int64_t)s->model->free_count;
-    take_arrays(s);
-    set_tolerances(s, values);
     restart(s, NULL);
     drape_status status = drape_arena_status(arena);
     if (status || s->n == 0)
@@ -749,16 +706,6 @@ static drape_work work(const void *state)
     return drape_work_with_linear(s->work, s->matrix.linear);
 }
 
-static void archive_polynomial(drape_archive *a, size_t n, polynomial *p)
-{
-    drape_archive_double(a, &p->t);
-    drape_archive_double(a, &p->h);
-    drape_archive_doubles(a, p->x, n);
-    drape_archive_doubles(a, p->v, n);
-    for (int i = 0; i < STAGES; i++)
-        drape_archive_doubles(a, p->stage[i], n);
-}
-
 static void archive(void *state, drape_archive *a)
 {
     radau_state *s = state;
@@ -771,7 +718,12 @@ static void archive(void *state, drape_archive *a)
     drape_work_archive(&s->work, a);
     if (s->n == 0)
         return;
-    archive_polynomial(a, (size_t)s->n, &s->last);
+    drape_archive_double(a, &s->last.t);
+    drape_archive_double(a, &s->last.h);
+    drape_archive_doubles(a, s->last.x, (size_t)s->n);
+    drape_archive_doubles(a, s->last.v, (size_t)s->n);
+    for (int i = 0; i < STAGES; i++)
+        drape_archive_doubles(a, s->last.stage[i], (size_t)s->n);
     drape_radau_matrix_archive(&s->matrix, a);
 }
 

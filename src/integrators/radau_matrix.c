@@ -23,13 +23,6 @@ static complex_number conjugate(complex_number a)
     return (complex_number){a.re, -a.im};
 }
 
-static complex_number quotient(complex_number a, complex_number b)
-{
-    const complex_number q = product(a, conjugate(b));
-    const double size = b.re * b.re + b.im * b.im;
-    return (complex_number){q.re / size, q.im / size};
-}
-
 /* ---- Memory ---- */
 
 static drape_status take_values(drape_radau_matrix *m)
@@ -82,16 +75,6 @@ static drape_status renew(drape_radau_matrix *m)
 
 /* ---- Matrices ---- */
 
-/* D with the upper bounds of restitution and friction, which drape_system_damping has not: what K + D has
- * more than K. */
-static void evaluate_bound(drape_radau_matrix *m, drape_point point)
-{
-    point.weight = 1;
-    drape_system_jacobian(m->system, &point, 0, 0, m->damping);
-    for (int64_t k = 0; k < m->linear->pattern->nonzeros; k++)
-        m->damping[k] -= m->stiffness[k];
-}
-
 drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_point *point)
 {
     bool changed;
@@ -106,9 +89,14 @@ drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_poin
     at.weight = 0;
     drape_sun_linear_set_positions(m->linear, at.x, drape_system_model(m->system)->node_of_free);
     drape_system_jacobian(m->system, &at, 0, 0, m->stiffness);
-    if (m->damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON)
-        evaluate_bound(m, at);
-    else if (m->damping)
+    if (m->damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON) {
+        /* D with the upper bounds of restitution and friction, which drape_system_damping has not: what K
+         * + D has more than K. */
+        at.weight = 1;
+        drape_system_jacobian(m->system, &at, 0, 0, m->damping);
+        for (int64_t k = 0; k < m->linear->pattern->nonzeros; k++)
+            m->damping[k] -= m->stiffness[k];
+    } else if (m->damping)
         drape_system_damping(m->system, &at, m->damping);
     /* Friction and dashpots of strains that rotate are not symmetric. As in ida.c, Newton's iteration does
      * not need those parts: with Cholesky factors a run takes three quarters of the time, for as many
@@ -244,22 +232,6 @@ static void rotate(complex_number c, double s, complex_number *x, complex_number
     *y = (complex_number){down.re - s * from.re, down.im - s * from.im};
 }
 
-/* Adds to x the combination of the basis with the least residual: the Hessenberg matrix, by columns, is
- * triangular, g is rotated. */
-static void combine(const drape_radau_matrix *m, int count, complex_number (*h)[VECTORS + 1],
-                    complex_number *g, double *x)
-{
-    for (int j = count - 1; j >= 0; j--) {
-        for (int i = j + 1; i < count; i++) {
-            const complex_number known = product(h[i][j], g[i]);
-            g[j].re -= known.re;
-            g[j].im -= known.im;
-        }
-        g[j] = quotient(g[j], h[j][j]);
-        add(m, g[j], vector(m, j), x);
-    }
-}
-
 drape_status drape_radau_matrix_solve_complex(drape_radau_matrix *m, const double *b, double tolerance,
                                               double *x)
 {
@@ -298,7 +270,19 @@ drape_status drape_radau_matrix_solve_complex(drape_radau_matrix *m, const doubl
     }
     if (!(left <= LARGEST * first))
         return DRAPE_RETRY_LINEAR;
-    combine(m, count, h, g, x);
+    /* Adds to x the combination of the basis with the least residual: the Hessenberg matrix, by columns,
+     * is triangular, g is rotated. */
+    for (int j = count - 1; j >= 0; j--) {
+        for (int i = j + 1; i < count; i++) {
+            const complex_number known = product(h[i][j], g[i]);
+            g[j].re -= known.re;
+            g[j].im -= known.im;
+        }
+        const complex_number by = h[j][j], q = product(g[j], conjugate(by));
+        const double size = by.re * by.re + by.im * by.im;
+        g[j] = (complex_number){q.re / size, q.im / size};
+        add(m, g[j], vector(m, j), x);
+    }
     return DRAPE_OK;
 }
 

@@ -216,17 +216,6 @@ static drape_status factor(rosenbrock_state *s, double w, drape_step_info *info)
     return drape_sun_linear_factor(s->linear, false);
 }
 
-/* y += D x */
-static void add_damping(const rosenbrock_state *s, const double *x, double *y)
-{
-    const drape_pattern *p = drape_system_pattern(s->common.equation.system);
-    if (!s->damping)
-        return;
-    for (int64_t j = 0; j < p->n; j++)
-        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            y[drape_pattern_row(p, j, k)] += s->damping[k] * x[j];
-}
-
 /* ---- Stages ---- */
 
 /* x, v of the equation, and pins, at a sum of stages. */
@@ -289,7 +278,10 @@ static drape_status solve_stage(rosenbrock_state *s, const drape_state *in, doub
         if (s->moved)
             s->right[k] -= scheme->gammas[i] * h * s->change[k];
     }
-    add_damping(s, s->rx, s->right);
+    const drape_pattern *p = drape_system_pattern(e->system);
+    for (int64_t j = 0; s->damping && j < p->n; j++)
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+            s->right[drape_pattern_row(p, j, k)] += s->damping[k] * s->rx[j];
     info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
     status = drape_sun_linear_solve(s->linear, s->right, s->ux[i]);
     for (size_t k = 0; k < e->dofs; k++)
@@ -357,31 +349,6 @@ static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double
 
 /* ---- A step ---- */
 
-/* What the forces depend on besides the state of the free nodes. */
-static bool depends_on_time(const rosenbrock_state *s)
-{
-    const drape_motion *m = s->common.motion;
-    bool moved = m->moved_count > 0 || m->model->supports_move ||
-                 drape_system_has_wind(s->common.equation.system) ||
-                 drape_system_is_timed(s->common.equation.system);
-    for (int32_t c = 0; !moved && c < m->model->collider_count; c++)
-        moved = drape_motion_moves_collider(m, c);
-    return moved;
-}
-
-static drape_status solve(rosenbrock_state *s, const drape_state *in, double h, drape_step_info *info)
-{
-    drape_status status = DRAPE_OK;
-    s->moved = depends_on_time(s);
-    if (s->moved)
-        status = evaluate_change(s, in->t, h, info);
-    if (!status)
-        status = factor(s, 1 / (drape_rosenbrock_rodas.gamma * h), info);
-    for (int i = 0; !status && i < drape_rosenbrock_rodas.stages; i++)
-        status = solve_stage(s, in, h, i, info);
-    return status;
-}
-
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -394,8 +361,20 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (!status)
         status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
     s->power = 0;
-    if (!status && e->dofs > 0)
-        status = solve(s, in, attempt.h, info);
+    if (!status && e->dofs > 0) {
+        /* What the forces depend on besides the state of the free nodes. */
+        const drape_motion *m = s->common.motion;
+        s->moved = m->moved_count > 0 || m->model->supports_move || drape_system_has_wind(e->system) ||
+                   drape_system_is_timed(e->system);
+        for (int32_t c = 0; !s->moved && c < m->model->collider_count; c++)
+            s->moved = drape_motion_moves_collider(m, c);
+        if (s->moved)
+            status = evaluate_change(s, in->t, attempt.h, info);
+        if (!status)
+            status = factor(s, 1 / (drape_rosenbrock_rodas.gamma * attempt.h), info);
+        for (int i = 0; !status && i < drape_rosenbrock_rodas.stages; i++)
+            status = solve_stage(s, in, attempt.h, i, info);
+    }
     if (status)
         return status;
     move_to(s, in, drape_rosenbrock_rodas.m, e->dofs > 0 ? drape_rosenbrock_rodas.stages : 0, attempt.t1);
@@ -419,8 +398,14 @@ static void restart(void *state, const drape_state *from)
 
 /* ---- Creation and destruction ---- */
 
-static void create_arrays(rosenbrock_state *s)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    rosenbrock_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->arena = arena;
+    drape_status status = drape_implicit_init(arena, system, &s->common);
+    drape_local_error_init(system, values, drape_rosenbrock_rodas.order, &s->control);
     const drape_step_equation *e = &s->common.equation;
     for (int i = 0; i < drape_rosenbrock_rodas.stages; i++) {
         s->ux[i] = drape_arena_take(s->arena, e->dofs, sizeof *s->ux[i]);
@@ -433,17 +418,6 @@ static void create_arrays(rosenbrock_state *s)
     if (s->common.dissipated)
         s->damping =
             drape_arena_take(s->arena, (size_t)drape_system_pattern(e->system)->nonzeros, sizeof *s->damping);
-}
-
-static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
-{
-    rosenbrock_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
-        return DRAPE_E_MEMORY;
-    s->arena = arena;
-    drape_status status = drape_implicit_init(arena, system, &s->common);
-    drape_local_error_init(system, values, drape_rosenbrock_rodas.order, &s->control);
-    create_arrays(s);
     if (!status)
         status = drape_arena_status(arena);
     if (status || s->common.equation.dofs == 0)

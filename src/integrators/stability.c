@@ -74,19 +74,6 @@ static double normalise(double *u, size_t n)
     return norm;
 }
 
-/* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave contributes to
- * them, and they are the same on every machine. */
-static void start(drape_spectrum *s)
-{
-    uint64_t seed = 1;
-    for (size_t i = 0; i < s->dofs; i++) {
-        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-        s->u[i] = (double)(seed >> 11) / 4503599627370496.0 - 1;
-        s->before[i] = 0;
-    }
-    normalise(s->u, s->dofs);
-}
-
 /* next = M^-1/2 (g(y + e M^-1/2 u) - g(y))/e, where y is s->x or s->v, whose free entries are those of
  * `from` (NULL: 0) before and after the call. */
 static void product(drape_spectrum *s, const drape_state *at, double *y, const double *from)
@@ -121,28 +108,20 @@ static int count_above(const double *a, const double *b, int n, double z)
     return count;
 }
 
-/* The largest eigenvalue of T, by bisection of the interval of Gershgorin's circles. */
-static double largest_of(const double *a, const double *b, int n)
-{
-    double low = 0, high = 0;
-    for (int j = 0; j < n; j++)
-        high = fmax(high, a[j] + (j > 0 ? fabs(b[j - 1]) : 0) + (j + 1 < n ? fabs(b[j]) : 0));
-    while (high - low > DBL_EPSILON * high) {
-        double middle = 0.5 * (low + high);
-        if (count_above(a, b, n, middle) > 0)
-            low = middle;
-        else
-            high = middle;
-    }
-    return 0.5 * (low + high);
-}
-
 /* The largest eigenvalue of the matrix whose products are derivatives by y. */
 static double largest(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const size_t dofs = s->dofs;
     int n = 0;
-    start(s);
+    /* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave contributes
+     * to them, and they are the same on every machine. */
+    uint64_t seed = 1;
+    for (size_t i = 0; i < s->dofs; i++) {
+        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        s->u[i] = (double)(seed >> 11) / 4503599627370496.0 - 1;
+        s->before[i] = 0;
+    }
+    normalise(s->u, s->dofs);
     while (n < s->iterations && dofs > 0) {
         product(s, at, y, from);
         double a = 0;
@@ -160,7 +139,18 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
         if (!(s->b[n - 1] * s->b[n - 1] > DBL_EPSILON * a * a))
             break; /* an eigenvalue is off by b^2 / |a| at most, or numbers are not finite */
     }
-    return largest_of(s->a, s->b, n);
+    /* The largest eigenvalue of T, by bisection of the interval of Gershgorin's circles. */
+    double low = 0, high = 0;
+    for (int j = 0; j < n; j++)
+        high = fmax(high, s->a[j] + (j > 0 ? fabs(s->b[j - 1]) : 0) + (j + 1 < n ? fabs(s->b[j]) : 0));
+    while (high - low > DBL_EPSILON * high) {
+        double middle = 0.5 * (low + high);
+        if (count_above(s->a, s->b, n, middle) > 0)
+            low = middle;
+        else
+            high = middle;
+    }
+    return 0.5 * (low + high);
 }
 
 void drape_spectrum_largest(drape_spectrum *s, const drape_state *at, double *omega, double *damping)

@@ -76,22 +76,6 @@ static drape_norm norm_of(const static_state *s)
     return (drape_norm)drape_newton_values(s->common.newton)[DRAPE_NEWTON_NORM];
 }
 
-/* Sets the equation of a step in pseudo time from x. Colliders rest, and corrections are too large for
- * forces to first order in them. */
-static void set_equation(static_state *s, const double *x, double mass_weight)
-{
-    drape_step_equation *e = &s->common.equation;
-    e->point.internal = s->internal;
-    e->point.weight = 0;
-    e->point.relaxed = true;
-    e->point.span[0] = e->point.t;
-    e->mass_weight = mass_weight;
-    e->x_start = NULL; /* corrections are too large for forces to first order in them */
-    memcpy(e->x_base, x, e->nodes * sizeof *e->x_base);
-    memset(e->v_base, 0, e->nodes * sizeof *e->v_base);
-    memset(e->inertia, 0, e->dofs * sizeof *e->inertia);
-}
-
 /* Makes one step in pseudo time from out->x, which changes only on success. tolerance: of its equation. */
 static drape_status pseudo_step(static_state *s, double mass_weight, double tolerance, drape_state *out,
                                 drape_step_info *info)
@@ -99,7 +83,16 @@ static drape_status pseudo_step(static_state *s, double mass_weight, double tole
     drape_implicit *c = &s->common;
     drape_step_equation *e = &c->equation;
     const double last = drape_implicit_tolerance(s);
-    set_equation(s, out->x, mass_weight);
+    /* colliders rest */
+    e->point.internal = s->internal;
+    e->point.weight = 0;
+    e->point.relaxed = true;
+    e->point.span[0] = e->point.t;
+    e->mass_weight = mass_weight;
+    e->x_start = NULL; /* corrections are too large for forces to first order in them */
+    memcpy(e->x_base, out->x, e->nodes * sizeof *e->x_base);
+    memset(e->v_base, 0, e->nodes * sizeof *e->v_base);
+    memset(e->inertia, 0, e->dofs * sizeof *e->inertia);
     drape_newton_set_tolerance(c->newton, tolerance);
     drape_status status = drape_implicit_solve(c, info);
     drape_newton_set_tolerance(c->newton, last);
@@ -124,16 +117,6 @@ static double static_residual(const static_state *s)
     for (size_t i = 0; i < e->dofs; i++)
         e->f[i] = e->g[drape_step_equation_at(e, i)];
     return drape_step_equation_norm(e, norm_of(s));
-}
-
-static void keep_best(static_state *s, const double *x, double residual)
-{
-    const drape_step_equation *e = &s->common.equation;
-    if (!(residual < s->best))
-        return;
-    s->best = residual;
-    memcpy(s->best_x, x, e->nodes * sizeof *x);
-    memcpy(s->best_internal, s->internal, (size_t)e->model->internal_count * sizeof *s->internal);
 }
 
 /* Goes back to the best step and reports its residual. */
@@ -173,7 +156,12 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
         fails = 0;
         info->tolerance = tolerance;
         info->residual = static_residual(s);
-        keep_best(s, out->x, info->residual);
+        if (info->residual < s->best) {
+            const drape_step_equation *e = &s->common.equation;
+            s->best = info->residual;
+            memcpy(s->best_x, out->x, e->nodes * sizeof *out->x);
+            memcpy(s->best_internal, s->internal, (size_t)e->model->internal_count * sizeof *s->internal);
+        }
         info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         if (info->residual <= tolerance)
             return DRAPE_OK;

@@ -52,14 +52,6 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
     return DRAPE_OK;
 }
 
-/* Computes g0, with the mean velocities of pins and colliders in the stage. */
-static void evaluate_start(trbdf2_state *s, const drape_state *in)
-{
-    const drape_step_equation *e = &s->common.equation;
-    memcpy(s->vg, e->v_base, e->nodes * sizeof *s->vg);
-    drape_implicit_force_at_start(&s->common, in, s->vg, s->g0);
-}
-
 /* The first stage, to xg, vg. The guess is free flight without g0, whose stiff part would make it far too
  * long. */
 static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, double w,
@@ -69,7 +61,9 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     drape_step_equation *e = &c->equation;
     drape_implicit_base(c, in, in->t + GAMMA * h, GAMMA * h);
     e->point.instant = true;
-    evaluate_start(s, in);
+    /* g0, with the mean velocities of pins and colliders in the stage. */
+    memcpy(s->vg, e->v_base, e->nodes * sizeof *s->vg);
+    drape_implicit_force_at_start(c, in, s->vg, s->g0);
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
         double flight = 2 / w * in->v[at];

@@ -156,24 +156,6 @@ static drape_status check_rigid(drape_arena *arena, const drape_model *m)
     return DRAPE_OK;
 }
 
-static drape_status create_parts(drape_arena *arena, verlet_state *s)
-{
-    const double *values = s->values;
-    drape_status status = check_rigid(arena, s->model);
-    if (!status)
-        status = create_arrays(arena, s);
-    if (!status)
-        status = drape_verlet_force_create(arena, s->system, &s->force);
-    if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
-        status = drape_verlet_limit_create(arena, s->model, values[PARAM_STRAIN_LIMIT],
-                                           (int)values[PARAM_STRAIN_LIMIT_ITERATIONS], &s->limit);
-    if (!status && s->model->contact.self)
-        status = drape_verlet_self_create(arena, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
-    if (!status)
-        status = drape_spectrum_create(arena, s->system, STABILITY_ITERATIONS, &s->spectrum);
-    return status;
-}
-
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
     verlet_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
@@ -190,7 +172,19 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
                                         .friction_drag = values[PARAM_FRICTION_DRAG]};
-    return create_parts(arena, s);
+    drape_status status = check_rigid(arena, s->model);
+    if (!status)
+        status = create_arrays(arena, s);
+    if (!status)
+        status = drape_verlet_force_create(arena, s->system, &s->force);
+    if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
+        status = drape_verlet_limit_create(arena, s->model, values[PARAM_STRAIN_LIMIT],
+                                           (int)values[PARAM_STRAIN_LIMIT_ITERATIONS], &s->limit);
+    if (!status && s->model->contact.self)
+        status = drape_verlet_self_create(arena, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
+    if (!status)
+        status = drape_spectrum_create(arena, s->system, STABILITY_ITERATIONS, &s->spectrum);
+    return status;
 }
 
 /* ---- Forces ---- */
@@ -326,17 +320,6 @@ static void project(verlet_state *s, const substep *sub)
     s->work.contact_seconds += drape_clock_seconds() - start;
 }
 
-static void substep_position(verlet_state *s, const substep *sub)
-{
-    start_pins(s, sub);
-    evaluate(s, sub, 1, sub->t0, sub->v, s->g);
-    audit_dissipation(s, sub, 1, sub->t0, sub->v);
-    audit_pins(s, sub, s->g, 1);
-    damp(s, sub);
-    move(s, sub, sub->h);
-    project(s, sub);
-}
-
 /* v + h/2 a, with the other half already added by move(): the velocity at the end, to first order. */
 static const double *velocity_ahead(const verlet_state *s, const substep *sub)
 {
@@ -445,15 +428,6 @@ static bool blew_up(const drape_model *m, const drape_state *out, drape_step_inf
     return true;
 }
 
-static drape_status refuse(drape_step_info *info)
-{
-    info->reason = drape_reason_name(DRAPE_REASON_MAX_SUBSTEPS);
-    info->diagnostic.what = "substeps";
-    info->diagnostic.value = MAX_SUBSTEPS + 1;
-    info->diagnostic.limit = MAX_SUBSTEPS;
-    return DRAPE_RETRY_REJECTED;
-}
-
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -462,8 +436,13 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     int64_t n = count_substeps(s, in, h);
     info->residual = info->tolerance = NAN;
     info->lenient = s->values[PARAM_GUARD] == 0;
-    if (s->values[PARAM_SUBSTEPS] == 0 && n > MAX_SUBSTEPS)
-        return refuse(info);
+    if (s->values[PARAM_SUBSTEPS] == 0 && n > MAX_SUBSTEPS) {
+        info->reason = drape_reason_name(DRAPE_REASON_MAX_SUBSTEPS);
+        info->diagnostic.what = "substeps";
+        info->diagnostic.value = MAX_SUBSTEPS + 1;
+        info->diagnostic.limit = MAX_SUBSTEPS;
+        return DRAPE_RETRY_REJECTED;
+    }
     memcpy(out->x, in->x, nodes * sizeof *out->x);
     memcpy(out->v, in->v, nodes * sizeof *out->v);
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
@@ -478,9 +457,15 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
                              .v = out->v,
                              .internal = in->internal,
                              .info = info};
-        if (s->values[PARAM_FORM] == FORM_POSITION)
-            substep_position(s, &sub);
-        else
+        if (s->values[PARAM_FORM] == FORM_POSITION) {
+            start_pins(s, &sub);
+            evaluate(s, &sub, 1, sub.t0, sub.v, s->g);
+            audit_dissipation(s, &sub, 1, sub.t0, sub.v);
+            audit_pins(s, &sub, s->g, 1);
+            damp(s, &sub);
+            move(s, &sub, sub.h);
+            project(s, &sub);
+        } else
             substep_velocity(s, &sub, k == 0);
         if (drape_system_cancelled(s->system))
             return drape_system_status(s->system);

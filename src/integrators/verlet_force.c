@@ -32,23 +32,18 @@ struct drape_verlet_force {
 
 /* ---- Creation ---- */
 
-/* The end of the run that begins at an element. */
-static int32_t run_end(const drape_elements *el, int32_t first)
-{
-    int32_t last = first;
-    const int32_t *node = el->node;
-    while (last + 1 < el->count && last + 1 - first < MAX_RUN && node[2 * last + 2] == node[2 * last] + 1 &&
-           node[2 * last + 3] == node[2 * last + 1] + 1)
-        last++;
-    return last + 1;
-}
-
 /* Returns the number of runs of a term; writes them if out is not NULL. */
 static int32_t find_runs(const drape_elements *el, run *out)
 {
     int32_t count = 0;
     for (int32_t first = 0, end; first < el->count; first = end, count++) {
-        end = run_end(el, first);
+        /* The end of the run that begins at an element. */
+        int32_t last = first;
+        const int32_t *node = el->node;
+        while (last + 1 < el->count && last + 1 - first < MAX_RUN &&
+               node[2 * last + 2] == node[2 * last] + 1 && node[2 * last + 3] == node[2 * last + 1] + 1)
+            last++;
+        end = last + 1;
         if (out)
             out[count] = (run){.a = el->node[2 * (size_t)first],
                                .b = el->node[2 * (size_t)first + 1],
@@ -59,24 +54,14 @@ static int32_t find_runs(const drape_elements *el, run *out)
     return count;
 }
 
-static bool has_runs(const drape_term *term)
-{
-    return term->ops->distance && term->law_count == 0 && !term->damping && term->sliders == 0 &&
-           find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
-}
-
-/* A law adds no forces of its own, and constraints are kept by moving nodes. */
-static bool has_forces(const drape_term *term)
-{
-    return !term->ops->law && !term->ops->constraint;
-}
-
 static drape_status create_runs(drape_arena *arena, drape_verlet_force *f)
 {
     const drape_model *m = f->model;
     for (int32_t i = 0; i < m->term_count; i++) {
-        f->summed[i] = has_runs(&m->terms[i]);
-        f->run_count += f->summed[i] ? find_runs(&m->terms[i].elements, NULL) : 0;
+        const drape_term *term = &m->terms[i];
+        f->summed[i] = term->ops->distance && term->law_count == 0 && !term->damping && term->sliders == 0 &&
+                       find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
+        f->run_count += f->summed[i] ? find_runs(&term->elements, NULL) : 0;
     }
     f->runs = drape_arena_take(arena, (size_t)f->run_count, sizeof *f->runs);
     if (!f->runs)
@@ -100,7 +85,8 @@ static drape_status sum_linear(drape_context *ctx, drape_verlet_force *f)
     for (int32_t i = 0; !status && i < m->term_count; i++) {
         others[i] = !m->terms[i].ops->linear || drape_term_changes(&m->terms[i]);
         f->summed[i] = f->summed[i] || !others[i];
-        f->has_rest = f->has_rest || (has_forces(&m->terms[i]) && !f->summed[i]);
+        /* A law adds no forces of its own, and constraints are kept by moving nodes. */
+        f->has_rest = f->has_rest || (!m->terms[i].ops->law && !m->terms[i].ops->constraint && !f->summed[i]);
     }
     if (!status) {
         drape_system_sum_forces(f->system, &(drape_point){.x = m->rest, .v = v}, others, g);

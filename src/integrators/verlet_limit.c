@@ -44,38 +44,6 @@ static int32_t later(const int32_t *node)
     return node[0] > node[1] ? node[0] : node[1];
 }
 
-/* start: where the springs begin whose later node is each node. */
-static void count_springs(const drape_model *m, int32_t *start)
-{
-    for (int32_t i = 0; i < m->term_count; i++) {
-        const drape_elements *el = &m->terms[i].elements;
-        for (int32_t e = 0; is_spring(&m->terms[i]) && e < el->count; e++)
-            start[later(el->node + 2 * (size_t)e) + 1]++;
-    }
-    for (int32_t i = 0; i < m->node_count; i++)
-        start[i + 1] += start[i];
-}
-
-static double rest_length(const drape_model *m, const int32_t *node)
-{
-    double d[3];
-    vec3_sub(m->rest + 3 * (size_t)node[1], m->rest + 3 * (size_t)node[0], d);
-    return vec3_norm(d);
-}
-
-static void place_springs(const drape_model *m, double limit, int32_t *start, drape_verlet_limit *out)
-{
-    for (int32_t i = 0; i < m->term_count; i++) {
-        const drape_elements *el = &m->terms[i].elements;
-        for (int32_t e = 0; is_spring(&m->terms[i]) && e < el->count; e++) {
-            const int32_t *node = el->node + 2 * (size_t)e;
-            size_t at = (size_t)start[later(node)]++;
-            memcpy(out->node + 2 * at, node, 2 * sizeof *node);
-            out->longest[at] = (1 + limit) * rest_length(m, node);
-        }
-    }
-}
-
 /* ---- Patches ---- */
 
 static int32_t step_of(const drape_verlet_limit *l, int32_t spring)
@@ -104,20 +72,6 @@ static bool has_same_steps(const drape_verlet_limit *l, const drape_verlet_patch
     return true;
 }
 
-/* The springs of node i of a patch have the nodes i and i - back[s]: to share one with those of an earlier
- * node j, i - j has to be a step or the difference of two. */
-static int32_t reach_of(const drape_verlet_patch *p)
-{
-    int32_t reach = 0;
-    for (int32_t s = 0; s < p->steps; s++)
-        for (int32_t t = -1; t < p->steps; t++) {
-            int32_t apart = p->back[s] - (t < 0 ? 0 : p->back[t]);
-            if (apart < MAX_PATCH_NODES && apart > reach)
-                reach = apart;
-        }
-    return reach;
-}
-
 static drape_verlet_patch patch_at(const drape_verlet_limit *l, int32_t first)
 {
     drape_verlet_patch p = {.first = first, .steps = count_steps(l, first), .nodes = 1};
@@ -130,19 +84,15 @@ static drape_verlet_patch patch_at(const drape_verlet_limit *l, int32_t first)
         p.nodes++;
     if (p.nodes < MIN_PATCH_NODES)
         return (drape_verlet_patch){.first = first, .nodes = p.steps * p.nodes};
-    p.reach = reach_of(&p);
-    return p;
-}
-
-/* Squares of a patch are in the order of steps, not of nodes: those that are compared in one loop are
- * neighbours. */
-static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
-{
-    for (int32_t s = 0; s < p->steps; s++)
-        for (int32_t i = 0; i < p->nodes; i++) {
-            double longest = l->longest[p->first + i * p->steps + s];
-            l->square[p->first + s * p->nodes + i] = longest * longest;
+    /* The springs of node i of a patch have the nodes i and i - back[s]: to share one with those of an
+     * earlier node j, i - j has to be a step or the difference of two. */
+    for (int32_t s = 0; s < p.steps; s++)
+        for (int32_t t = -1; t < p.steps; t++) {
+            int32_t apart = p.back[s] - (t < 0 ? 0 : p.back[t]);
+            if (apart < MAX_PATCH_NODES && apart > p.reach)
+                p.reach = apart;
         }
+    return p;
 }
 
 /* Returns the number of patches; writes them if out is not NULL. Adjacent ones without steps are one
@@ -154,8 +104,15 @@ static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
     for (int32_t first = 0; first < l->count;) {
         const drape_verlet_patch p = patch_at(l, first);
         first += p.nodes * (p.steps > 0 ? p.steps : 1);
-        if (out && p.steps > 0)
-            place_squares(l, &p);
+        if (out && p.steps > 0) {
+            /* Squares of a patch are in the order of steps, not of nodes: those that are compared in one
+             * loop are neighbours. */
+            for (int32_t s = 0; s < p.steps; s++)
+                for (int32_t i = 0; i < p.nodes; i++) {
+                    double longest = l->longest[p.first + i * p.steps + s];
+                    l->square[p.first + s * p.nodes + i] = longest * longest;
+                }
+        }
         if (open && p.steps == 0) {
             if (out)
                 out[count - 1].nodes += p.nodes;
@@ -178,7 +135,14 @@ drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m,
     *out = (drape_verlet_limit){.pinned = m->pinned, .node_count = m->node_count, .passes = passes};
     if (!start)
         return DRAPE_E_MEMORY;
-    count_springs(m, start);
+    /* where the springs begin whose later node is each node */
+    for (int32_t i = 0; i < m->term_count; i++) {
+        const drape_elements *el = &m->terms[i].elements;
+        for (int32_t e = 0; is_spring(&m->terms[i]) && e < el->count; e++)
+            start[later(el->node + 2 * (size_t)e) + 1]++;
+    }
+    for (int32_t i = 0; i < m->node_count; i++)
+        start[i + 1] += start[i];
     out->count = start[m->node_count];
     out->node = drape_arena_take(arena, 2 * (size_t)out->count, sizeof *out->node);
     out->longest = drape_arena_take(arena, (size_t)out->count, sizeof *out->longest);
@@ -186,7 +150,17 @@ drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m,
     out->x = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *out->x);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    place_springs(m, limit, start, out);
+    for (int32_t i = 0; i < m->term_count; i++) {
+        const drape_elements *el = &m->terms[i].elements;
+        for (int32_t e = 0; is_spring(&m->terms[i]) && e < el->count; e++) {
+            const int32_t *node = el->node + 2 * (size_t)e;
+            const size_t at = (size_t)start[later(node)]++;
+            double d[3];
+            memcpy(out->node + 2 * at, node, 2 * sizeof *node);
+            vec3_sub(m->rest + 3 * (size_t)node[1], m->rest + 3 * (size_t)node[0], d);
+            out->longest[at] = (1 + limit) * vec3_norm(d);
+        }
+    }
     drape_arena_release(arena, start);
     out->patch_count = find_patches(out, NULL);
     out->patch = drape_arena_take(arena, (size_t)out->patch_count, sizeof *out->patch);
@@ -197,17 +171,6 @@ drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m,
 }
 
 /* ---- Passes ---- */
-
-static void shorten(const drape_verlet_limit *l, const int32_t *node, double by, const double d[3])
-{
-    bool pinned0 = l->pinned[node[0]], pinned1 = l->pinned[node[1]];
-    double share0 = pinned0 ? 0 : pinned1 ? 1 : 0.5, share1 = pinned1 ? 0 : pinned0 ? 1 : 0.5;
-    for (size_t k = 0; k < 3; k++) {
-        double *x = l->x + k * (size_t)l->node_count;
-        x[node[0]] += share0 * by * d[k];
-        x[node[1]] -= share1 * by * d[k];
-    }
-}
 
 /* One spring after the other. worst: the largest square of length/longest so far; returns the new one. *moved
  * is set if a spring was too long. */
@@ -222,7 +185,19 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
             continue;
         worst = fmax(worst, l->pinned[a] && l->pinned[b] ? 0 : square / (longest * longest));
         *moved = true;
-        shorten(l, node, 1 - longest / sqrt(square), d);
+        const bool pinned0 = l->pinned[a], pinned1 = l->pinned[b];
+        const double share0 = pinned0   ? 0
+                              : pinned1 ? 1
+                                        : 0.5,
+                     share1 = pinned1   ? 0
+                              : pinned0 ? 1
+                                        : 0.5,
+                     by = 1 - longest / sqrt(square);
+        for (size_t k = 0; k < 3; k++) {
+            double *to = l->x + k * (size_t)l->node_count;
+            to[a] += share0 * by * d[k];
+            to[b] -= share1 * by * d[k];
+        }
     }
     return worst;
 }

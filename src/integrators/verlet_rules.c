@@ -73,26 +73,6 @@ static void project_cs184(const drape_verlet_contact *contact, const pose *p, co
         x[k] = y0[k] + share * (t[k] - y0[k]);
 }
 
-static void project_boson(const pose *p, const double *y0, double phi, const double *n, double *x)
-{
-    if (is_flat(p, x))
-        memcpy(x, y0, 3 * sizeof *x);
-    else
-        vec3_add_scaled(-phi, n, x);
-}
-
-/* A node that is moved from `before` to x in a substep of h gets the impulse m (x - before)/h. The work of
- * the collider is that impulse times its mean velocity where the node is: friction and impacts, which only
- * take energy as seen from a collider that moves, are not a part of it. */
-static double push_work(double mass, double h, const double *before, const double *x, const double *x0,
-                        const double *y0)
-{
-    double moved[3], carried[3];
-    vec3_sub(x, before, moved);
-    vec3_sub(y0, x0, carried);
-    return mass / (h * h) * vec3_dot(moved, carried);
-}
-
 /* Returns the work of the collider. */
 static double project_on(const drape_verlet_contact *contact, const pose *p, double h, const double *x0,
                          double *x)
@@ -108,9 +88,17 @@ static double project_on(const drape_verlet_contact *contact, const pose *p, dou
         const double before[3] = {x[i], x[i + 1], x[i + 2]};
         if (contact->rule == DRAPE_VERLET_CS184)
             project_cs184(contact, p, y0, phi, n, x + i);
+        else if (is_flat(p, x + i))
+            memcpy(x + i, y0, 3 * sizeof *x);
         else
-            project_boson(p, y0, phi, n, x + i);
-        work += push_work(m->mass[i / 3], h, before, x + i, x0 + i, y0);
+            vec3_add_scaled(-phi, n, x + i);
+        /* A node that is moved from `before` to x in a substep of h gets the impulse m (x - before)/h. The
+         * work of the collider is that impulse times its mean velocity where the node is: friction and
+         * impacts, which only take energy as seen from a collider that moves, are not a part of it. */
+        double moved[3], carried[3];
+        vec3_sub(x + i, before, moved);
+        vec3_sub(y0, x0 + i, carried);
+        work += m->mass[i / 3] / (h * h) * vec3_dot(moved, carried);
     }
     return work;
 }
@@ -174,29 +162,24 @@ double drape_verlet_friction(const drape_verlet_contact *contact, double t, cons
 
 /* ---- Cloth against cloth ---- */
 
-/* The sizes of CS184's boxes, by the first cloth; three mean edges if its mesh is not a grid. */
-static void box_of_cs184(const drape_model *m, double size[3])
-{
-    const drape_mesh *mesh = &m->cloths[0].mesh;
-    double mean = 0, d[3];
-    for (int32_t e = 0; e < m->edge_count; e++)
-        mean += m->edge_length[e] / m->edge_count;
-    size[0] = size[1] = size[2] = 3 * mean;
-    if (mesh->rows == 0)
-        return;
-    vec3_sub(m->rest + 3 * (size_t)(mesh->columns - 1), m->rest, d);
-    size[0] = 3 * vec3_norm(d) / mesh->columns;
-    vec3_sub(m->rest + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns, m->rest, d);
-    size[1] = 3 * vec3_norm(d) / mesh->rows;
-    size[2] = fmax(size[0], size[1]);
-}
-
 drape_status drape_verlet_self_create(drape_arena *arena, const drape_model *m, bool same_box,
                                       drape_verlet_self *out)
 {
     double size[3];
     *out = (drape_verlet_self){.model = m, .reach = 2 * m->contact.self_thickness};
-    box_of_cs184(m, size);
+    /* The sizes of CS184's boxes, by the first cloth; three mean edges if its mesh is not a grid. */
+    const drape_mesh *mesh = &m->cloths[0].mesh;
+    double mean = 0, d[3];
+    for (int32_t e = 0; e < m->edge_count; e++)
+        mean += m->edge_length[e] / m->edge_count;
+    size[0] = size[1] = size[2] = 3 * mean;
+    if (mesh->rows != 0) {
+        vec3_sub(m->rest + 3 * (size_t)(mesh->columns - 1), m->rest, d);
+        size[0] = 3 * vec3_norm(d) / mesh->columns;
+        vec3_sub(m->rest + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns, m->rest, d);
+        size[1] = 3 * vec3_norm(d) / mesh->rows;
+        size[2] = fmax(size[0], size[1]);
+    }
     for (int k = 0; k < 3; k++)
         out->per_box[k] = 1 / size[k];
     if (same_box)
@@ -204,19 +187,6 @@ drape_status drape_verlet_self_create(drape_arena *arena, const drape_model *m, 
     if (same_box && !out->box)
         return DRAPE_E_MEMORY;
     return drape_neighbours_create(arena, m->node_count, out->reach, &out->neighbours);
-}
-
-/* A box as 21 bits of each of its numbers: points that are near to each other are not 2^20 boxes apart. */
-static uint64_t box_of(const drape_verlet_self *s, const double *x)
-{
-    uint64_t box = 0;
-    for (int k = 0; k < 3; k++) {
-        double number = x[k] * s->per_box[k];
-        int32_t cut = fabs(number) < INT32_MAX ? (int32_t)number : 0;
-        cut -= fabs(number) < INT32_MAX && number < cut; /* floor */
-        box = box << 21 | ((uint32_t)cut & 0x1FFFFFu);
-    }
-    return box;
 }
 
 /* Moves node i by the rule. near NULL: all points, of which there are count. */
@@ -244,22 +214,6 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
         vec3_add_scaled(share / pushing, sum, own);
 }
 
-/* Copies the near points in the box of a point to `kept`, which may be near. near NULL: of all points, the
- * first that fit. */
-static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, const double *x,
-                    int32_t kept[DRAPE_MAX_NEIGHBOURS + 1])
-{
-    int number = 0;
-    for (int k = 0; k < count && number < DRAPE_MAX_NEIGHBOURS; k++) {
-        const int32_t j = near ? near[k] : k;
-        double d[3];
-        vec3_sub(x + 3 * (size_t)i, x + 3 * (size_t)j, d);
-        kept[number] = j;
-        number += (s->box[j] == s->box[i]) & (j != i) & (near || vec3_dot(d, d) < s->reach * s->reach);
-    }
-    return number;
-}
-
 /* Finds the near points that push a point. NULL: all points do, as in a pile of cloth much thicker than its
  * mesh is fine, where a point has more near points than a list can hold. */
 static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
@@ -272,7 +226,17 @@ static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
     }
     if (!s->box)
         return count;
-    count = keep_box(s, i, *near, count, x, room);
+    /* Keeps the near points in the box of the point, in `room`, which may be *near; of all points, the first
+     * that fit. */
+    int number = 0;
+    for (int k = 0; k < count && number < DRAPE_MAX_NEIGHBOURS; k++) {
+        const int32_t j = *near ? (*near)[k] : k;
+        double d[3];
+        vec3_sub(x + 3 * (size_t)i, x + 3 * (size_t)j, d);
+        room[number] = j;
+        number += (s->box[j] == s->box[i]) & (j != i) & (*near || vec3_dot(d, d) < s->reach * s->reach);
+    }
+    count = number;
     *near = room;
     return count;
 }
@@ -280,8 +244,18 @@ static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
 void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
 {
     drape_neighbours_update(&s->neighbours, share, x);
-    for (int32_t i = 0; s->box && i < s->model->node_count; i++)
-        s->box[i] = box_of(s, x + 3 * (size_t)i);
+    for (int32_t i = 0; s->box && i < s->model->node_count; i++) {
+        /* A box as 21 bits of each of its numbers: points that are near to each other are not 2^20 boxes
+         * apart. */
+        uint64_t box = 0;
+        for (int k = 0; k < 3; k++) {
+            double number = x[3 * (size_t)i + (size_t)k] * s->per_box[k];
+            int32_t cut = fabs(number) < INT32_MAX ? (int32_t)number : 0;
+            cut -= fabs(number) < INT32_MAX && number < cut; /* floor */
+            box = box << 21 | ((uint32_t)cut & 0x1FFFFFu);
+        }
+        s->box[i] = box;
+    }
     for (int32_t i = 0; i < s->model->node_count && !(s->cancel && atomic_load(s->cancel)); i++) {
         int32_t room[DRAPE_MAX_NEIGHBOURS + 1];
         const int32_t *near;

@@ -37,20 +37,6 @@ static void invert_block(double a[6])
 
 /* ---- y = A x ---- */
 
-static void multiply_scalars(const drape_approx_jacobian *s, const double *x, double *y)
-{
-    const drape_scalar_stiffness *c = &s->scalar;
-    for (int32_t i = 0; i < s->nodes; i++) {
-        double sum[3] = {0};
-        for (int32_t k = c->start[i]; k < c->start[i + 1]; k++) {
-            const double *from = x + 3 * (size_t)c->column[k];
-            for (int r = 0; r < 3; r++)
-                sum[r] += c->sum[k] * from[r];
-        }
-        memcpy(y + 3 * (size_t)i, sum, sizeof sum);
-    }
-}
-
 static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y)
 {
     static const double pinned[3] = {0, 0, 0};
@@ -71,26 +57,30 @@ static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y
     }
 }
 
-static void add_remainder(const drape_approx_jacobian *s, const double *x, double *y)
+void drape_approx_jacobian_multiply(const drape_approx_jacobian *s, const double *x, double *y)
 {
+    const drape_scalar_stiffness *c = &s->scalar;
+    for (int32_t i = 0; i < s->nodes; i++) {
+        double sum[3] = {0};
+        for (int32_t k = c->start[i]; k < c->start[i + 1]; k++) {
+            const double *from = x + 3 * (size_t)c->column[k];
+            for (int r = 0; r < 3; r++)
+                sum[r] += c->sum[k] * from[r];
+        }
+        memcpy(y + 3 * (size_t)i, sum, sizeof sum);
+    }
+    add_pairs(s, x, y);
     const remainder_matrix *m = &s->remainder;
     for (int32_t k = 0; k < m->count; k++) {
         size_t i = 3 * (size_t)m->row[k], j = 3 * (size_t)m->column[k];
         const double *b = m->block + 9 * (size_t)k;
         for (size_t r = 0; r < 3; r++)
-            for (size_t c = 0; c < 3; c++) {
-                y[i + r] += b[3 * r + c] * x[j + c];
+            for (size_t q = 0; q < 3; q++) {
+                y[i + r] += b[3 * r + q] * x[j + q];
                 if (i != j)
-                    y[j + c] += b[3 * r + c] * x[i + r];
+                    y[j + q] += b[3 * r + q] * x[i + r];
             }
     }
-}
-
-void drape_approx_jacobian_multiply(const drape_approx_jacobian *s, const double *x, double *y)
-{
-    multiply_scalars(s, x, y);
-    add_pairs(s, x, y);
-    add_remainder(s, x, y);
     drape_system_project_free(s->system, y);
 }
 
@@ -115,18 +105,6 @@ static void precondition(const void *owner, const double *r, double *z)
 
 /* ---- Update ---- */
 
-static void evaluate_pairs(drape_approx_jacobian *s, const drape_point *point)
-{
-    double *to = s->h;
-    for (int32_t t = 0; t < s->model->term_count; t++) {
-        const drape_term *term = &s->model->terms[t];
-        if (!term->ops->pair)
-            continue;
-        drape_system_pairs(s->system, t, point, to);
-        to += 6 * (size_t)term->elements.count;
-    }
-}
-
 /* One block, row by row; false if it is zero. */
 static bool read_block(const drape_pattern *p, double *values, int32_t column, int32_t block, double *to)
 {
@@ -141,34 +119,6 @@ static bool read_block(const drape_pattern *p, double *values, int32_t column, i
     return any;
 }
 
-/* b = (b + mirror')/2, because friction makes blocks nonsymmetric. */
-static void symmetrize(double *b, const double *mirror)
-{
-    double t[9];
-    for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++)
-            t[3 * r + c] = (b[3 * r + c] + mirror[3 * c + r]) / 2;
-    memcpy(b, t, sizeof t);
-}
-
-static void list_remainder(drape_approx_jacobian *s)
-{
-    const drape_pattern *p = drape_system_pattern(s->system);
-    remainder_matrix *m = &s->remainder;
-    m->count = 0;
-    for (int32_t j = 0; j < p->block_count; j++)
-        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
-            double *to = m->block + 9 * (size_t)m->count, mirror[9];
-            int32_t i = p->block_row[k];
-            if (!read_block(p, m->values, j, k, to))
-                continue;
-            read_block(p, m->values, i, i == j ? k : drape_pattern_find(p, j, i), mirror);
-            symmetrize(to, mirror);
-            m->row[m->count] = i;
-            m->column[m->count++] = j;
-        }
-}
-
 static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point, bool friction)
 {
     bool changed;
@@ -181,7 +131,25 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
     if (status)
         return status;
     drape_system_remainder(s->system, point, s->remainder.values);
-    list_remainder(s);
+    const drape_pattern *p = drape_system_pattern(s->system);
+    remainder_matrix *m = &s->remainder;
+    m->count = 0;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
+            double *to = m->block + 9 * (size_t)m->count, mirror[9];
+            int32_t i = p->block_row[k];
+            if (!read_block(p, m->values, j, k, to))
+                continue;
+            read_block(p, m->values, i, i == j ? k : drape_pattern_find(p, j, i), mirror);
+            /* b = (b + mirror')/2, because friction makes blocks nonsymmetric. */
+            double t[9];
+            for (int r = 0; r < 3; r++)
+                for (int c = 0; c < 3; c++)
+                    t[3 * r + c] = (to[3 * r + c] + mirror[3 * c + r]) / 2;
+            memcpy(to, t, sizeof t);
+            m->row[m->count] = i;
+            m->column[m->count++] = j;
+        }
     return friction ? drape_nonsymmetric_update(&s->friction, point, NULL) : DRAPE_OK;
 }
 
@@ -212,22 +180,6 @@ static void invert_diagonal(drape_approx_jacobian *s)
 }
 
 /* ---- The matrix on the coarse space ---- */
-
-static void sum_coarse_pairs(drape_approx_jacobian *s)
-{
-    coarse_matrix *c = &s->coarse;
-    size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
-    for (size_t k = 0; k < slots; k++) {
-        double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
-        memcpy(c->sum + 6 * k, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
-    }
-    for (int32_t p = 0; p < s->pairs; p++) {
-        const double *h = s->h + 6 * (size_t)p;
-        for (int64_t k = c->pair_start[p]; k < c->pair_start[p + 1]; k++)
-            for (int i = 0; i < 6; i++)
-                c->sum[6 * (size_t)c->slot[k] + (size_t)i] += c->weight[k] * h[i];
-    }
-}
 
 /* Expands the blocks on and below the diagonal to the values of the pattern. */
 static void expand_coarse(drape_approx_jacobian *s)
@@ -261,9 +213,23 @@ static void add_coarse_block(drape_approx_jacobian *s, int32_t row, int32_t colu
             to[q * stride + r] += w * (transposed ? b[3 * q + r] : b[3 * r + q]);
 }
 
-static void add_coarse_remainder(drape_approx_jacobian *s)
+static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
 {
-    const drape_prolong *p = &s->coarse.prolong;
+    double start = drape_clock_seconds();
+    coarse_matrix *c = &s->coarse;
+    size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
+    for (size_t k = 0; k < slots; k++) {
+        double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
+        memcpy(c->sum + 6 * k, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
+    }
+    for (int32_t p = 0; p < s->pairs; p++) {
+        const double *h = s->h + 6 * (size_t)p;
+        for (int64_t k = c->pair_start[p]; k < c->pair_start[p + 1]; k++)
+            for (int i = 0; i < 6; i++)
+                c->sum[6 * (size_t)c->slot[k] + (size_t)i] += c->weight[k] * h[i];
+    }
+    expand_coarse(s);
+    const drape_prolong *p = &c->prolong;
     const remainder_matrix *m = &s->remainder;
     for (int32_t k = 0; k < m->count; k++) {
         const double *b = m->block + 9 * (size_t)k;
@@ -275,15 +241,7 @@ static void add_coarse_remainder(drape_approx_jacobian *s)
                     add_coarse_block(s, p->column[v], p->column[u], w, b, true);
             }
     }
-}
-
-static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
-{
-    double start = drape_clock_seconds();
-    sum_coarse_pairs(s);
-    expand_coarse(s);
-    add_coarse_remainder(s);
-    drape_status status = s->coarse.linear->factor(s->coarse.solver, s->coarse.values);
+    drape_status status = c->linear->factor(c->solver, c->values);
     s->coarse_due = status != DRAPE_OK;
     work->factorizations++;
     work->factor_seconds += drape_clock_seconds() - start;
@@ -309,7 +267,14 @@ static drape_status assemble(void *matrix, const drape_point *point, double mass
     drape_status status = evaluate_remainder(s, point, s->has_friction);
     if (!status) {
         drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
-        evaluate_pairs(s, point);
+        double *to = s->h;
+        for (int32_t t = 0; t < s->model->term_count; t++) {
+            const drape_term *term = &s->model->terms[t];
+            if (!term->ops->pair)
+                continue;
+            drape_system_pairs(s->system, t, point, to);
+            to += 6 * (size_t)term->elements.count;
+        }
         invert_diagonal(s);
     }
     work->jacobians++;

@@ -223,25 +223,20 @@ drape_status drape_approx_jacobian_extend(drape_approx_jacobian *s)
     return drape_arena_status(&r->arena);
 }
 
-/* Of all measures that are not of pairs. */
-static drape_status build_scalar(drape_approx_jacobian *s)
-{
-    drape_arena scratch = drape_arena_of(s->arena->ctx);
-    bool *of = drape_arena_take(&scratch, (size_t)s->model->term_count, sizeof *of);
-    drape_status status = drape_arena_status(&scratch);
-    for (int32_t t = 0; !status && t < s->model->term_count; t++)
-        of[t] = s->model->terms[t].ops->measure && !s->model->terms[t].ops->pair;
-    if (!status)
-        status = drape_scalar_stiffness_build(s->arena, s->system, of, &s->scalar);
-    drape_arena_free(&scratch);
-    return status;
-}
-
 drape_status drape_approx_jacobian_build(drape_approx_jacobian *s)
 {
     drape_status status = list_pairs(s);
-    if (!status)
-        status = build_scalar(s);
+    if (!status) {
+        /* Of all measures that are not of pairs. */
+        drape_arena scratch = drape_arena_of(s->arena->ctx);
+        bool *of = drape_arena_take(&scratch, (size_t)s->model->term_count, sizeof *of);
+        status = drape_arena_status(&scratch);
+        for (int32_t t = 0; !status && t < s->model->term_count; t++)
+            of[t] = s->model->terms[t].ops->measure && !s->model->terms[t].ops->pair;
+        if (!status)
+            status = drape_scalar_stiffness_build(s->arena, s->system, of, &s->scalar);
+        drape_arena_free(&scratch);
+    }
     if (!status)
         status = build_coarse(s);
     return status ? status : drape_approx_jacobian_extend(s);

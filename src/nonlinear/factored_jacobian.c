@@ -122,21 +122,6 @@ static void place_scalars(drape_factored_jacobian *s)
     }
 }
 
-/* Adds C and the masses; what is not in the pattern is lumped. */
-static void add_scalars(const drape_factored_jacobian *s, double *values)
-{
-    const drape_pattern *p = drape_system_pattern(s->system);
-    const drape_scalar_stiffness *c = &s->scalar;
-    for (int32_t j = 0; j < c->n; j++)
-        for (int32_t k = c->start[j]; k < c->start[j + 1]; k++) {
-            int64_t stride;
-            double *to =
-                drape_pattern_at(p, values, j, s->block[k] >= 0 ? s->block[k] : p->diagonal[j], &stride);
-            for (int r = 0; r < 3; r++)
-                to[r * stride + r] += c->sum[k];
-        }
-}
-
 /* The pattern may have changed, or be that of a checkpoint. */
 static drape_status take_pattern(drape_factored_jacobian *s)
 {
@@ -161,7 +146,17 @@ static drape_status compute(drape_factored_jacobian *s, const drape_point *at, d
     drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
     drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian_without(s->system, &point, 0, positive ? 1 : 0, s->flat, s->linear->values);
-    add_scalars(s, s->linear->values);
+    /* Adds C and the masses; what is not in the pattern is lumped. */
+    const drape_pattern *p = drape_system_pattern(s->system);
+    const drape_scalar_stiffness *c = &s->scalar;
+    for (int32_t j = 0; j < c->n; j++)
+        for (int32_t k = c->start[j]; k < c->start[j + 1]; k++) {
+            int64_t stride;
+            double *to = drape_pattern_at(p, s->linear->values, j,
+                                          s->block[k] >= 0 ? s->block[k] : p->diagonal[j], &stride);
+            for (int r = 0; r < 3; r++)
+                to[r * stride + r] += c->sum[k];
+        }
     status = drape_nonsymmetric_update(&s->rest, &point, s->nonsymmetric ? s->linear->values : NULL);
     drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     drape_system_project_matrix(s->system, s->linear->values);
@@ -193,9 +188,12 @@ static drape_status factor(void *matrix, bool definite, drape_work *work)
 
 /* ---- Solve ---- */
 
-/* y = N x, which is symmetric: column by column. */
-static void multiply_narrow(const drape_factored_jacobian *s, const double *x, double *y)
+/* y = A x */
+static void multiply(const void *owner, const double *x, double *y)
 {
+    const drape_factored_jacobian *s = owner;
+    const drape_scalar_stiffness *c = &s->scalar;
+    /* y = N x, which is symmetric: column by column. */
     const drape_pattern *p = drape_system_pattern(s->system);
     for (int32_t j = 0; j < p->block_count; j++) {
         double sum[3] = {0};
@@ -203,19 +201,11 @@ static void multiply_narrow(const drape_factored_jacobian *s, const double *x, d
             int64_t stride;
             const double *a = drape_pattern_at(p, s->linear->values, j, k, &stride),
                          *from = x + 3 * (size_t)p->block_row[k];
-            for (int c = 0; c < 3; c++)
-                sum[c] += vec3_dot(a + c * stride, from);
+            for (int r = 0; r < 3; r++)
+                sum[r] += vec3_dot(a + r * stride, from);
         }
         memcpy(y + 3 * (size_t)j, sum, sizeof sum);
     }
-}
-
-/* y = A x */
-static void multiply(const void *owner, const double *x, double *y)
-{
-    const drape_factored_jacobian *s = owner;
-    const drape_scalar_stiffness *c = &s->scalar;
-    multiply_narrow(s, x, y);
     for (int32_t i = 0; i < c->n; i++)
         for (int32_t k = c->start[i]; k < c->start[i + 1]; k++)
             for (size_t r = 0; s->block[k] < 0 && r < 3; r++)

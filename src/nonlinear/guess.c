@@ -51,29 +51,26 @@ static void start_aside(drape_step_equation *e, double *aside)
     change(e, drape_system_carry_layers, aside);
 }
 
-/* What is shortened is the path from where moving colliders have put the nodes at the start of the step: from
- * the start itself, which may lie inside a collider at the end of the step, a part of the path may end
- * inside, too. It is shortened only at nodes that would meet something: all pairs that come near in the step
- * are active from the first matrix on, and none of them holds up the rest of the cloth. */
-static void shorten(drape_step_equation *e, double *d, double *aside, double *fraction)
-{
-    change(e, drape_system_sweep, d);
-    start_aside(e, aside);
-    drape_step_equation_move(e, aside);
-    for (size_t i = 0; i < e->dofs; i++)
-        d[i] -= aside[i];
-    if (!drape_step_equation_shorten_nodes(e, d, fraction))
-        drape_step_equation_make_feasible(e, d);
-    for (size_t i = 0; i < e->dofs; i++)
-        d[i] += aside[i];
-}
-
 void drape_guess_make_feasible(drape_step_equation *e, double *d, double *aside, double *fraction)
 {
     drape_step_equation_move(e, d);
     /* springs beyond their limit pull with forces far above any others: d = 0 is better */
     if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
         memset(d, 0, e->dofs * sizeof *d);
-    if (fraction)
-        shorten(e, d, aside, fraction);
+    if (fraction) {
+        /* What is shortened is the path from where moving colliders have put the nodes at the start of the
+         * step: from the start itself, which may lie inside a collider at the end of the step, a part of
+         * the path may end inside, too. It is shortened only at nodes that would meet something: all pairs
+         * that come near in the step are active from the first matrix on, and none of them holds up the
+         * rest of the cloth. */
+        change(e, drape_system_sweep, d);
+        start_aside(e, aside);
+        drape_step_equation_move(e, aside);
+        for (size_t i = 0; i < e->dofs; i++)
+            d[i] -= aside[i];
+        if (!drape_step_equation_shorten_nodes(e, d, fraction))
+            drape_step_equation_make_feasible(e, d);
+        for (size_t i = 0; i < e->dofs; i++)
+            d[i] += aside[i];
+    }
 }

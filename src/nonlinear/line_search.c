@@ -33,19 +33,6 @@ static double length_at(const drape_line_search *s, size_t i)
     return s->lengths[s->islands->of[i / 3]].length;
 }
 
-/* Evaluates F at d + (before + a p), rounded as the caller adds them. */
-static void try_lengths(drape_line_search *s, const double *d, const double *before, const double *p)
-{
-    drape_step_equation *e = s->equation;
-    for (size_t i = 0; i < e->dofs; i++)
-        s->trial[i] = d[i] + ((before ? before[i] : 0) + length_at(s, i) * p[i]);
-    s->evaluated = drape_step_equation_evaluate(e, s->trial);
-    if (s->evaluated)
-        measure(s, p);
-    for (int32_t k = 0; !s->evaluated && k < s->islands->count; k++)
-        s->lengths[k].end = INFINITY;
-}
-
 drape_length drape_length_begin(double start)
 {
     return (drape_length){.length = 1, .start = start, .high = INFINITY, .found = !(start < 0)};
@@ -118,7 +105,15 @@ void drape_line_search_along(drape_line_search *s, const double *d, const double
         s->evaluated = false;
         if (!stays_feasible(s, d, p, longest))
             break;
-        try_lengths(s, d, before, p);
+        /* Evaluates F at d + (before + a p), rounded as the caller adds them. */
+        drape_step_equation *e = s->equation;
+        for (size_t i = 0; i < e->dofs; i++)
+            s->trial[i] = d[i] + ((before ? before[i] : 0) + length_at(s, i) * p[i]);
+        s->evaluated = drape_step_equation_evaluate(e, s->trial);
+        if (s->evaluated)
+            measure(s, p);
+        for (int32_t k = 0; !s->evaluated && k < s->islands->count; k++)
+            s->lengths[k].end = INFINITY;
         found = judge_all(s, joint, longest > 1);
     }
     s->shortest = INFINITY;

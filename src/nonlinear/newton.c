@@ -248,14 +248,6 @@ static void begin(drape_newton *s)
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
-/* Whether the solve begins with the linearized equation. Its solution knows of no contact to come. */
-static bool linearizes(const drape_newton *s)
-{
-    const drape_step_equation *e = s->equation;
-    return s->searches && !s->fraction && e->x_start && e->pins_ahead > MAX_AHEAD * s->edge &&
-           drape_step_equation_pins_move(e);
-}
-
 /* Where a pin takes a sheet along, nodes that keep their velocity stay behind. The elements at the pin are
  * stretched by as much, and it takes many corrections until their forces have reached the rest of a stiff
  * sheet. The linearized equation takes the pull of the pins to all nodes at once: d = -A^-1 (F + dF/dpins
@@ -264,7 +256,9 @@ static bool linearizes(const drape_newton *s)
 static drape_status guess_linearized(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
-    if (!linearizes(s))
+    /* Its solution knows of no contact to come. */
+    if (!s->searches || s->fraction || !e->x_start || !(e->pins_ahead > MAX_AHEAD * s->edge) ||
+        !drape_step_equation_pins_move(e))
         return DRAPE_OK;
     N_VSetArrayPointer(s->search.trial, s->unknown);
     drape_step_equation_pull(e, s->search.trial, s->step);
@@ -375,19 +369,6 @@ static drape_status ensure_descent(drape_newton *s, drape_status status, const d
     return status ? status : solve(s, minus_f, s->tolerance, p);
 }
 
-/* Along the first corrections, which are long. If they have not led near a solution, the sheet may be buckling: then
- * forces extrapolated along a correction are meaningless, and the iteration may cycle. */
-static void predict_stress(drape_newton *s, const double *p)
-{
-    drape_step_equation *e = s->equation;
-    double start = drape_system_clock(e->system);
-    if (s->corrections <= MAX_PREDICTION)
-        drape_stress_predictor_correct(&s->predictor, &e->point, p);
-    else
-        drape_stress_predictor_forget(&s->predictor);
-    e->work.jacobian_seconds += drape_system_clock(e->system) - start;
-}
-
 /* The longest displacement of a node in p. */
 static double longest(const drape_step_equation *e, const double *p)
 {
@@ -469,10 +450,17 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
  * iterative solver that leaves much of the residual is no exact matrix. */
 static drape_status advance(drape_newton *s, const double *d, double fraction, double *p)
 {
-    const drape_step_equation *e = s->equation;
+    drape_step_equation *e = s->equation;
     const bool definite = !s->positive && (!s->matrix->ops->exact || s->tolerance <= EXACT);
     const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
-    predict_stress(s, p);
+    /* Along the first corrections, which are long. If they have not led near a solution, the sheet may be
+     * buckling: then forces extrapolated along a correction are meaningless, and the iteration may cycle. */
+    double start = drape_system_clock(e->system);
+    if (s->corrections <= MAX_PREDICTION)
+        drape_stress_predictor_correct(&s->predictor, &e->point, p);
+    else
+        drape_stress_predictor_forget(&s->predictor);
+    e->work.jacobian_seconds += drape_system_clock(e->system) - start;
     drape_line_search_along(&s->search, d, NULL, longest, p);
     const bool at_once = s->search.evaluated && s->search.shortest == 1 && s->search.longest == 1;
     drape_stopping_test_error(&s->stopping, s->search.lengths, d, p, definite && s->matrix->ops->exact,
@@ -551,31 +539,6 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
-/* What is left is less than the last correction, or what follows the estimate, where these contract; without
- * one it is less than if nothing but inertia resisted F. Pseudo-transient steps, which have no start, are no
- * motion. */
-static void estimate_left(drape_newton *s, const double *d, drape_solve_report *report)
-{
-    const drape_step_equation *e = s->equation;
-    double left;
-    if (!s->searches || !e->x_start || isnan(report->residual))
-        return;
-    report->own = drape_step_equation_local_error(e, d);
-    report->error = drape_step_equation_inertial_error(e, &report->left);
-    if (!drape_stopping_left(&s->stopping, &left))
-        return;
-    report->error = fmin(report->error, s->error);
-    report->left = fmin(report->left, left);
-}
-
-/* Whether an effort that is spent has come nearer than the guess was, and not further off than the scene is
- * large. */
-static bool is_nearer(const drape_newton *s)
-{
-    return s->effort.keeps && (s->left < s->start || s->error < s->first) &&
-           !(s->error > s->equation->model->length);
-}
-
 /* Whether F at d is small enough. If KINSOL converged, its last evaluation was at d; otherwise it may have
  * been at a trial point. */
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_solve_report *report)
@@ -589,7 +552,18 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     report->tolerance = tolerance;
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     report->diagnostic = drape_step_equation_diagnose(e, tolerance);
-    estimate_left(s, d, report);
+    /* What is left is less than the last correction, or what follows the estimate, where these contract;
+     * without one it is less than if nothing but inertia resisted F. Pseudo-transient steps, which have no
+     * start, are no motion. */
+    double left;
+    if (s->searches && e->x_start && !isnan(report->residual)) {
+        report->own = drape_step_equation_local_error(e, d);
+        report->error = drape_step_equation_inertial_error(e, &report->left);
+        if (drape_stopping_left(&s->stopping, &left)) {
+            report->error = fmin(report->error, s->error);
+            report->left = fmin(report->left, left);
+        }
+    }
     if (report->residual <= tolerance) {
         report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
@@ -607,7 +581,10 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         report->tolerance = rounding;
         return DRAPE_OK;
     }
-    if (finite && status >= 0 && is_nearer(s)) {
+    /* An effort that is spent has come nearer than the guess was, and not further off than the scene is
+     * large. */
+    if (finite && status >= 0 && s->effort.keeps && (s->left < s->start || s->error < s->first) &&
+        !(s->error > e->model->length)) {
         report->reason = drape_reason_name(DRAPE_REASON_ITERATIONS);
         report->tolerance = NAN;
         report->solved = false;
@@ -622,15 +599,6 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
                                                      : drape_step_equation_find_cause(e, status, report);
 }
 
-/* Whether KINSOL could not go on because all that is left, besides islands that are done, is rounding. */
-static bool is_settled(drape_newton *s, drape_status status, const double *d)
-{
-    drape_step_equation *e = s->equation;
-    const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
-    return status > 0 && s->stopping.ended_by_error && drape_step_equation_evaluate(e, d) &&
-           drape_step_equation_norm(e, norm) <= drape_step_equation_rounding(e, d, norm);
-}
-
 static drape_status conclude(drape_newton *s, int code, const double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
@@ -640,7 +608,10 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     report->iterations = (int)iterations;
     report->laborious = !s->effort.keeps && iterations > MANY;
     e->work.newton_iterations += iterations;
-    if (s->searches && is_settled(s, status, d))
+    /* KINSOL could not go on because all that is left, besides islands that are done, is rounding. */
+    const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
+    if (s->searches && status > 0 && s->stopping.ended_by_error && drape_step_equation_evaluate(e, d) &&
+        drape_step_equation_norm(e, norm) <= drape_step_equation_rounding(e, d, norm))
         status = DRAPE_OK;
     if (s->searches)
         drape_stopping_end(&s->stopping);
@@ -707,18 +678,6 @@ static bool configure(drape_newton *s)
            !KINSetMaxBetaFails(s->kin, LONG_MAX); /* of KINSOL's curvature condition: no limit */
 }
 
-static drape_status create_search(drape_arena *arena, drape_newton *s)
-{
-    drape_step_equation *e = s->equation;
-    s->step = drape_arena_take(arena, e->dofs, sizeof *s->step);
-    drape_status status = drape_islands_init(arena, e->dofs / 3, &s->islands);
-    if (!status)
-        status = drape_line_search_init(arena, e, &s->islands, &s->search);
-    if (!status)
-        status = drape_stopping_init(arena, e, &s->islands, &s->stopping);
-    return status ? status : drape_stress_predictor_init(arena, e->system, &s->predictor);
-}
-
 /* Making a vector of ranks is collective, and copying it is not. */
 static drape_status create_vectors(drape_arena *arena, drape_newton *s)
 {
@@ -783,8 +742,16 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
                                  values[DRAPE_NEWTON_TOLERANCE], &s->values[DRAPE_NEWTON_TOLERANCE]);
     if (!status)
         status = drape_arena_status(arena);
-    if (!status && s->searches)
-        status = create_search(arena, s);
+    if (!status && s->searches) {
+        s->step = drape_arena_take(arena, equation->dofs, sizeof *s->step);
+        status = drape_islands_init(arena, equation->dofs / 3, &s->islands);
+        if (!status)
+            status = drape_line_search_init(arena, equation, &s->islands, &s->search);
+        if (!status)
+            status = drape_stopping_init(arena, equation, &s->islands, &s->stopping);
+        if (!status)
+            status = drape_stress_predictor_init(arena, equation->system, &s->predictor);
+    }
     drape_reserve reserve = {.used = false};
     if (!status)
         status = drape_reserve_open(&reserve, arena->ctx, equation->dofs);

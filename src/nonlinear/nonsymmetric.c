@@ -56,32 +56,14 @@ static bool is_zero(const double *block, int64_t stride)
     return true;
 }
 
-static void list_blocks(drape_nonsymmetric *s)
-{
-    const drape_pattern *p = drape_system_pattern(s->system);
-    s->count = 0;
-    for (int32_t j = 0; j < p->block_count; j++)
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
-            int64_t stride;
-            const double *block = drape_pattern_at(p, s->values, j, k, &stride);
-            if (is_zero(block, stride))
-                continue;
-            s->column[s->count] = j;
-            s->slot[s->count++] = k;
-        }
-}
-
-/* Whether contact is a part of E - A. Not while bodies leave some cloth no room: with it, cloth was still in
- * them half a second after they had parted, in one of the pinches of the tests, and in none without. */
-static bool has_contact(const drape_system *system)
-{
-    return drape_system_has_friction(system) && !drape_contact_exempts(drape_system_contact(system)) &&
-           drape_system_touches(system);
-}
-
 drape_status drape_nonsymmetric_update(drape_nonsymmetric *s, const drape_point *point, const double *terms)
 {
-    const bool contact = s->system && has_contact(s->system);
+    /* Whether contact is a part of E - A. Not while bodies leave some cloth no room: with it, cloth was
+     * still in them half a second after they had parted, in one of the pinches of the tests, and in none
+     * without. */
+    const bool contact = s->system && drape_system_has_friction(s->system) &&
+                         !drape_contact_exempts(drape_system_contact(s->system)) &&
+                         drape_system_touches(s->system);
     s->acts = s->system && (contact || terms);
     if (!s->acts)
         return DRAPE_OK;
@@ -96,7 +78,16 @@ drape_status drape_nonsymmetric_update(drape_nonsymmetric *s, const drape_point 
         memset(s->values, 0, (size_t)p->nonzeros * sizeof *s->values);
     if (terms)
         drape_pattern_add_antisymmetric(p, terms, s->values);
-    list_blocks(s);
+    s->count = 0;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride;
+            const double *block = drape_pattern_at(p, s->values, j, k, &stride);
+            if (is_zero(block, stride))
+                continue;
+            s->column[s->count] = j;
+            s->slot[s->count++] = k;
+        }
     return DRAPE_OK;
 }
 

@@ -31,17 +31,6 @@ static bool stays_apart(const drape_sim *sim, int32_t collider, const double pat
     return stays;
 }
 
-/* Whether the cloth can go ahead by that, with the colliders that are sent. */
-static bool may_go_ahead(const drape_sim *sim, double end, const double path[3])
-{
-    const drape_motion *motion = drape_system_motion(sim->system);
-    const double t = drape_sim_state(sim)->t;
-    bool may = true;
-    for (int32_t c = 0; c < sim->model->collider_count && may; c++)
-        may = drape_motion_sends_collider(motion, c, t, end) || stays_apart(sim, c, path);
-    return may;
-}
-
 static drape_status go_ahead(drape_sim *sim, double end, const double path[3])
 {
     const drape_motion *motion = drape_system_motion(sim->system);
@@ -76,7 +65,9 @@ drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rat
     bool goes = drape_motion_sends_pins(motion, part.t, part.end) &&
                 drape_motion_moves_as_one(motion, 0, sim->model->node_count, now->x, part.end, part.common);
     vec3_add_scaled(dropped, part.common, ahead);
-    goes = goes && may_go_ahead(sim, part.end, ahead);
+    /* Whether the cloth can go ahead by that, with the colliders that are sent. */
+    for (int32_t c = 0; c < sim->model->collider_count && goes; c++)
+        goes = drape_motion_sends_collider(motion, c, part.t, part.end) || stays_apart(sim, c, ahead);
     for (int k = 0; k < 3; k++) {
         part.common[k] = goes ? part.common[k] : 0;
         part.left[k] = goes ? (1 - dropped) * part.common[k] : 0;

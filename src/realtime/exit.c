@@ -154,19 +154,6 @@ static int32_t root_of(int32_t *parent, int32_t node)
     return node;
 }
 
-/* Joins the nodes of faces that `take` in patches, the first node of each at its root. */
-static void join(const drape_contact *c, const uint8_t *take, int32_t *parent)
-{
-    for (int32_t i = 0; i < c->model->node_count; i++)
-        parent[i] = i;
-    for (int32_t f = 0; f < c->model->triangle_count; f++)
-        for (size_t a = 1; take[f] && a < 3; a++) {
-            const int32_t *n = c->model->triangle + 3 * (size_t)f, one = root_of(parent, n[0]),
-                          other = root_of(parent, n[a]);
-            parent[one > other ? one : other] = one > other ? other : one;
-        }
-}
-
 static double normal_of(const drape_contact *c, int32_t face, double normal[3])
 {
     vec3_triangle_normal(c->model->triangle + 3 * (size_t)face, c->x, normal);
@@ -236,7 +223,15 @@ static void gather(search *s)
 {
     const drape_model *m = s->c->model;
     memset(s->patches, 0, (size_t)m->node_count * sizeof *s->patches);
-    join(s->c, s->face, s->parent);
+    /* Joins the nodes of faces that are marked in patches, the first node of each at its root. */
+    for (int32_t i = 0; i < m->node_count; i++)
+        s->parent[i] = i;
+    for (int32_t f = 0; f < m->triangle_count; f++)
+        for (size_t a = 1; s->face[f] && a < 3; a++) {
+            const int32_t *n = m->triangle + 3 * (size_t)f, one = root_of(s->parent, n[0]),
+                          other = root_of(s->parent, n[a]);
+            s->parent[one > other ? one : other] = one > other ? other : one;
+        }
     for (int32_t f = 0; f < m->triangle_count; f++) {
         double normal[3];
         if (!s->face[f])

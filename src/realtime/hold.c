@@ -15,15 +15,6 @@
 #define MOST_IN_A_ROW  10
 #define MOST_IN_A_STEP 24
 
-static bool must_hold(const drape_sim *sim, drape_status failure, bool stopped)
-{
-    const drape_realtime_memory *m = sim->realtime;
-    const bool worn_out = stopped || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
-    const bool may_help = failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL;
-    return worn_out && may_help && m->active && !sim->chosen.integrator->own_steps &&
-           sim->model->contact.no_room != DRAPE_NO_ROOM_STOP;
-}
-
 /* A nominal step, or what is left of the advance. */
 static double end_of_hold(const drape_sim *sim)
 {
@@ -112,7 +103,11 @@ bool drape_sim_hold(drape_sim *sim, drape_status failure, drape_step_info *info,
 {
     drape_step_info held;
     drape_state *next = &sim->states[sim->next];
-    if (!must_hold(sim, failure, *stop != 0))
+    const drape_realtime_memory *m = sim->realtime;
+    const bool worn_out = *stop || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
+    const bool may_help = failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL;
+    if (!worn_out || !may_help || !m->active || sim->chosen.integrator->own_steps ||
+        sim->model->contact.no_room == DRAPE_NO_ROOM_STOP)
         return false;
     drape_status status = make_step(sim, next, &held);
     drape_system_end_step(sim->system);

@@ -52,16 +52,6 @@ static double expected(const drape_sim *sim, int effort)
     return effort > 0 && cost[1] == 0 ? CHEAPER * cost[0] : cost[effort];
 }
 
-/* The machine makes both levels of effort slower or faster alike: their ratio is kept. */
-static void learn(drape_realtime_memory *m, double seconds)
-{
-    double *own = &m->cost[m->effort];
-    const double before = *own;
-    *own = before == 0 ? seconds : (1 - LEARN) * before + LEARN * seconds;
-    if (before > 0)
-        m->cost[!m->effort] *= *own / before;
-}
-
 /* ---- The level of effort ---- */
 
 typedef struct plan {
@@ -127,23 +117,6 @@ static plan make_plan(drape_sim *sim, double owed, double frame, double budget)
 
 /* ---- A call ---- */
 
-/* Sets the end of the call and, if the sim counts steps, their size h; integrators and controllers that
- * choose their own steps continue to do so. */
-static void aim(drape_sim *sim, const plan *p, double end)
-{
-    drape_schedule *s = &sim->schedule;
-    if (s->stepping == DRAPE_STEPS_COUNTED)
-        drape_schedule_init(s, s->stepping, p->h, drape_sim_state(sim)->t);
-    drape_schedule_aim(s, end);
-}
-
-/* The checks at the end of an attempt, the energies and what observers do. Their time rises at once, because
- * a frame that is late is worse than one with an iteration less. */
-static void learn_ending(drape_realtime_memory *m, double seconds)
-{
-    m->ending = fmax(seconds, (1 - LEARN) * m->ending + LEARN * seconds);
-}
-
 /* Further iterations in a step leave enough of the budget for its end, and for the least work of the steps
  * after it. */
 static void set_deadline(drape_sim *sim, const plan *p, const drape_realtime *report, double until)
@@ -200,31 +173,28 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         set_deadline(sim, p, report, begun + IN_TIME * budget);
         status = drape_sim_step(sim, t1, h, &attempt);
         const double end = drape_clock_seconds();
-        learn(sim->realtime, end - start - sim->realtime->further_seconds);
-        learn_ending(sim->realtime, end - sim->realtime->solved_at);
-        sim->realtime->touches = drape_system_touches(sim->system);
-        sim->realtime->unchecked |= attempt.accepted && pins_move_apart(sim);
+        drape_realtime_memory *m = sim->realtime;
+        /* The machine makes both levels of effort slower or faster alike: their ratio is kept. */
+        double *own = &m->cost[m->effort];
+        const double before = *own, seconds = end - start - m->further_seconds, ending = end - m->solved_at;
+        *own = before == 0 ? seconds : (1 - LEARN) * before + LEARN * seconds;
+        if (before > 0)
+            m->cost[!m->effort] *= *own / before;
+        /* The checks at the end of an attempt, the energies and what observers do. Their time rises at
+         * once, because a frame that is late is worse than one with an iteration less. */
+        m->ending = fmax(ending, (1 - LEARN) * m->ending + LEARN * ending);
+        m->touches = drape_system_touches(sim->system);
+        m->unchecked |= attempt.accepted && pins_move_apart(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;
         report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
         if (!attempt.accepted && !sim->schedule.cut)
-            sim->realtime->cap =
-                sim->realtime->relaxed_again ? INFINITY : fmin(sim->realtime->cap, attempt.h / 2);
+            m->cap = m->relaxed_again ? INFINITY : fmin(m->cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
         report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
         report->error = attempt.accepted ? fmax(report->error, attempt.error) : report->error;
     }
     return status;
-}
-
-/* After a rejection, the next call does not retry the rejected step size; later calls do. If no smaller step
- * was accepted in the call, the next one begins with half of it, which the cap is by then. */
-static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
-{
-    if (report->rejected == 0)
-        m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
-    else if (report->h > 0)
-        m->cap = report->h;
 }
 
 /* ---- Cloth that passes through itself ---- */
@@ -291,7 +261,13 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
     m->dropped += report->dropped;
     drape_sim_fall_behind(sim, rates, left, report->dropped);
     m->stretched = report->h > (1 + DRAPE_SAME) * m->dt || m->debt > 0;
-    bound_steps(m, report);
+    /* After a rejection, the next call does not retry the rejected step size; later calls do. If no
+     * smaller step was accepted in the call, the next one begins with half of it, which the cap is by
+     * then. */
+    if (report->rejected == 0)
+        m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
+    else if (report->h > 0)
+        m->cap = report->h;
     count_crossings(sim, m->unchecked || lets_cloth_pass(sim));
     m->crossed += m->crossings > 0;
     report->crossings = m->crossings;
@@ -323,18 +299,6 @@ static drape_status check_arguments(drape_sim *sim, double frame_dt, double budg
     return DRAPE_OK;
 }
 
-static void enter(drape_sim *sim)
-{
-    drape_realtime_memory *m = sim->realtime;
-    if (m->active)
-        return;
-    m->active = true;
-    m->cap = INFINITY;
-    m->crossings = sim->model->contact.self ? drape_sim_intersections(sim, -1) : 0;
-    m->dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate);
-    m->longest = sim->realtime_step > 0 ? fmax(sim->realtime_step, m->dt) : STRETCH * m->dt;
-}
-
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
 {
     drape_realtime report = {.level = "full", .residual = NAN, .error = NAN, .error_bound = NAN};
@@ -356,7 +320,14 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
     double owed = frame_dt;
     drape_catch_up rates = {false, 1, 1};
     if (!status) {
-        enter(sim);
+        drape_realtime_memory *m = sim->realtime;
+        if (!m->active) {
+            m->active = true;
+            m->cap = INFINITY;
+            m->crossings = sim->model->contact.self ? drape_sim_intersections(sim, -1) : 0;
+            m->dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate);
+            m->longest = sim->realtime_step > 0 ? fmax(sim->realtime_step, m->dt) : STRETCH * m->dt;
+        }
         owed += sim->realtime->debt;
         status = drape_sim_catch_up(sim, owed, &rates);
     }
@@ -368,7 +339,12 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
         const plan p = make_plan(sim, owed, frame_dt, budget);
         drape_realtime_set_effort(sim, p.effort);
         if (p.steps > 0) {
-            aim(sim, &p, goal);
+            /* Sets the end of the call and, if the sim counts steps, their size h; integrators and
+             * controllers that choose their own steps continue to do so. */
+            drape_schedule *s = &sim->schedule;
+            if (s->stepping == DRAPE_STEPS_COUNTED)
+                drape_schedule_init(s, s->stepping, p.h, drape_sim_state(sim)->t);
+            drape_schedule_aim(s, goal);
             status = take_steps(sim, &p, start, budget, &report);
         }
         settle(sim, goal, &rates, &report);

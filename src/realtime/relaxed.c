@@ -23,17 +23,6 @@ static void bound_of(const drape_collider_shape *shape, double out[4])
     out[3] = radius + shape->radius;
 }
 
-/* Parts without a radius, triangles of a mesh, or parts that enclose more than what is within their radius:
- * the middle is deeper. */
-static bool is_solid(const drape_collider *collider, const double middle[3])
-{
-    static const drape_collider_pose rest = {.displacement = {0}};
-    const drape_collider_shape *shape = &collider->shape;
-    return shape->point_count > 0 &&
-           (!(shape->radius > 0) || !collider->ops->smooth ||
-            drape_collider_distance(collider, &rest, middle, NULL, NULL) < -(1 + DRAPE_SAME) * shape->radius);
-}
-
 const double *drape_relaxed_bound_of(const drape_contact *c, int32_t collider)
 {
     drape_relaxed_set *set = drape_relaxed_of(c);
@@ -150,7 +139,14 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *conta
     for (size_t i = 0; !drape_arena_status(arena) && i < colliders; i++) {
         bound_of(&model->colliders[i].shape, set->bound + 4 * i);
         set->bound_t[i] = NAN;
-        set->solid[i] = is_solid(&model->colliders[i], set->bound + 4 * i);
+        /* Parts without a radius, triangles of a mesh, or parts that enclose more than what is within
+         * their radius: the middle is deeper. */
+        static const drape_collider_pose rest = {.displacement = {0}};
+        const drape_collider_shape *shape = &model->colliders[i].shape;
+        set->solid[i] = shape->point_count > 0 &&
+                        (!(shape->radius > 0) || !model->colliders[i].ops->smooth ||
+                         drape_collider_distance(&model->colliders[i], &rest, set->bound + 4 * i, NULL,
+                                                 NULL) < -(1 + DRAPE_SAME) * shape->radius);
     }
     return drape_arena_status(arena);
 }
@@ -191,11 +187,6 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
     return DRAPE_OK;
 }
 
-static drape_relaxed_total *total_of(drape_relaxed_set *set, int32_t collider)
-{
-    return &set->total[collider >= 0 ? collider : set->model->collider_count];
-}
-
 int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider)
 {
     return place_of(set, collider + 1, 0) - place_of(set, collider, 0);
@@ -211,7 +202,7 @@ double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider)
 
 static void add_to_total(drape_relaxed_set *set, int32_t collider, double t)
 {
-    drape_relaxed_total *total = total_of(set, collider);
+    drape_relaxed_total *total = &set->total[collider >= 0 ? collider : set->model->collider_count];
     const int32_t first = place_of(set, collider, 0), count = drape_relaxed_count(set, collider);
     const double since = drape_relaxed_since(set, collider);
     if (count == 0)
@@ -291,21 +282,10 @@ drape_status drape_relaxed_continue(drape_relaxed_set *to, const drape_relaxed_s
     return status;
 }
 
-static void archive_node(drape_relaxed_node *node, drape_archive *a)
+void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)
 {
-    double *const values[] = {&node->since,  &node->until,   &node->depth,   &node->deepest, &node->gap,
-                              &node->factor, &node->exit[0], &node->exit[1], &node->exit[2], &node->height};
-    drape_archive_int32(a, &node->collider);
-    drape_archive_int32(a, &node->node);
-    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
-        drape_archive_double(a, values[i]);
-    drape_archive_bool(a, &node->blocked);
-    drape_archive_bool(a, &node->fresh);
-    drape_archive_bool(a, &node->exits);
-}
-
-static void archive_totals(drape_relaxed_set *set, drape_archive *a)
-{
+    int32_t count = set->exempt.count, added = 0;
+    drape_archive_double(a, &set->t);
     for (int32_t i = 0; i <= set->model->collider_count; i++) {
         drape_relaxed_total *total = &set->total[i];
         drape_archive_int32(a, &total->most);
@@ -314,20 +294,6 @@ static void archive_totals(drape_relaxed_set *set, drape_archive *a)
         drape_archive_double(a, &total->last);
         drape_archive_double(a, &total->seconds);
     }
-}
-
-static bool is_node(const drape_relaxed_set *set, const drape_relaxed_node *node)
-{
-    return node->collider >= -1 && node->collider < set->model->collider_count && node->node >= 0 &&
-           node->node < set->model->node_count && node->factor >= 1 && isfinite(node->factor) &&
-           isfinite(node->height) && isfinite(node->exit[0] + node->exit[1] + node->exit[2]);
-}
-
-void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)
-{
-    int32_t count = set->exempt.count, added = 0;
-    drape_archive_double(a, &set->t);
-    archive_totals(set, a);
     for (int32_t i = 0; i <= set->model->collider_count; i++)
         drape_archive_bool(a, &set->logged[i]);
     drape_archive_int32(a, &count);
@@ -335,10 +301,20 @@ void drape_relaxed_archive(drape_relaxed_set *set, drape_archive *a)
         set->exempt.count = 0;
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
         drape_relaxed_node node = a->reading ? (drape_relaxed_node){0} : set->nodes[i];
-        archive_node(&node, a);
+        double *const values[] = {&node.since,  &node.until,   &node.depth,   &node.deepest, &node.gap,
+                                  &node.factor, &node.exit[0], &node.exit[1], &node.exit[2], &node.height};
+        drape_archive_int32(a, &node.collider);
+        drape_archive_int32(a, &node.node);
+        for (size_t k = 0; k < sizeof values / sizeof *values; k++)
+            drape_archive_double(a, values[k]);
+        drape_archive_bool(a, &node.blocked);
+        drape_archive_bool(a, &node.fresh);
+        drape_archive_bool(a, &node.exits);
         if (!a->reading || !drape_archive_good(a))
             continue;
-        if (!is_node(set, &node))
+        if (!(node.collider >= -1 && node.collider < set->model->collider_count && node.node >= 0 &&
+              node.node < set->model->node_count && node.factor >= 1 && isfinite(node.factor) &&
+              isfinite(node.height) && isfinite(node.exit[0] + node.exit[1] + node.exit[2])))
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint relaxes a node that is not there");
         else if (drape_relaxed_add(set, node.collider, node.node, node.since, node.until, &added))
             drape_archive_note(a, DRAPE_E_MEMORY);

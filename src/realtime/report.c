@@ -52,29 +52,27 @@ int32_t drape_sim_relaxed_now(const drape_sim *sim, double *deepest)
     return set ? set->exempt.count : 0;
 }
 
-/* With the times of the summary: nodes are relaxed, and held again, at the beginning of a step. */
-static void log_collider(drape_sim *sim, int32_t collider, bool relaxed)
-{
-    const drape_relaxed_total *total = drape_sim_relaxed_total(sim, collider);
-    const char *name = drape_sim_relaxed_name(sim, collider);
-    if (relaxed)
-        drape_log(sim->ctx, DRAPE_LOG_WARNING, "t=%.9g: no room for the cloth at %s: it is relaxed there",
-                  drape_relaxed_since(drape_realtime_relaxed(sim), collider), name);
-    else
-        drape_log(
-            sim->ctx, DRAPE_LOG_INFO,
-            "t=%.9g: the cloth at %s has room again; it was relaxed for %.4g s so far, up to %.4g m deep",
-            total->last, name, total->seconds, total->deepest);
-}
-
 void drape_sim_log_relaxed(drape_sim *sim)
 {
     drape_relaxed_set *set = drape_realtime_relaxed(sim);
     for (int32_t c = -1; set && sim->ctx->def.log && c < sim->model->collider_count; c++) {
         bool *logged = &set->logged[c >= 0 ? c : sim->model->collider_count];
         const bool relaxed = drape_relaxed_count(set, c) > 0;
-        if (relaxed != *logged)
-            log_collider(sim, c, relaxed);
+        if (relaxed != *logged) {
+            /* With the times of the summary: nodes are relaxed, and held again, at the beginning of a
+             * step. */
+            const drape_relaxed_total *total = drape_sim_relaxed_total(sim, c);
+            const char *name = drape_sim_relaxed_name(sim, c);
+            if (relaxed)
+                drape_log(sim->ctx, DRAPE_LOG_WARNING,
+                          "t=%.9g: no room for the cloth at %s: it is relaxed there",
+                          drape_relaxed_since(set, c), name);
+            else
+                drape_log(sim->ctx, DRAPE_LOG_INFO,
+                          "t=%.9g: the cloth at %s has room again; it was relaxed for %.4g s so far, up to "
+                          "%.4g m deep",
+                          total->last, name, total->seconds, total->deepest);
+        }
         *logged = relaxed;
     }
 }

@@ -212,16 +212,6 @@ static drape_status block_pins(drape_contact *c, int32_t collider, double margin
     return status;
 }
 
-/* Whether a contact has a pin inside the collider. */
-static bool has_pin_inside(const drape_contact *c, int32_t collider, const cloth_point *p, double margin)
-{
-    bool found = false;
-    for (int a = 0; a < p->nodes; a++)
-        found = found || (c->model->pinned[p->node[a]] &&
-                          drape_room_distance(c, collider, c->x + 3 * (size_t)p->node[a], NULL) < margin);
-    return found;
-}
-
 static drape_status block_between(drape_contact *c, int32_t collider, const cloth_point *p, double margin,
                                   double t, bool may_relax, int32_t *added)
 {
@@ -298,7 +288,11 @@ static drape_status look_ahead(drape_contact *c, const double *x, double t, doub
             continue;
         const cloth_point p = point_of(c, contact);
         const int32_t collider = contact->pair.collider;
-        if (!relaxed->pins[collider] && has_pin_inside(c, collider, &p, margin)) {
+        bool inside = false; /* a pin of the contact, in the collider */
+        for (int a = 0; !relaxed->pins[collider] && !inside && a < p.nodes; a++)
+            inside = c->model->pinned[p.node[a]] &&
+                     drape_room_distance(c, collider, c->x + 3 * (size_t)p.node[a], NULL) < margin;
+        if (inside) {
             relaxed->pins[collider] = true;
             status = block_pins(c, collider, margin, t, may_relax, added);
         }

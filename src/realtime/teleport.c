@@ -18,13 +18,6 @@
  * spread of the pins counts against any rotation, and turns it by as much at most [rad]. */
 #define REST 1e-6
 
-static bool exceeds(const drape_sim *sim, const double *from, const double *to, double seconds)
-{
-    double path[3];
-    vec3_sub(to, from, path);
-    return sim->teleport_speed > 0 && vec3_norm(path) > sim->teleport_speed * seconds;
-}
-
 /* ---- The best rigid motion ---- */
 
 /* Of the pins of a cloth: where they are, and where they are to be. */
@@ -68,24 +61,6 @@ static double correlate(const pins *p, const double *from, const double *to, dou
     return spread;
 }
 
-/* The unit quaternion q that makes q' N q largest, for Horn's matrix N of the products S. */
-static void best_quaternion(const double S[9], double rest, double q[4])
-{
-    const double xx = S[0], xy = S[1], xz = S[2], yx = S[3], yy = S[4], yz = S[5], zx = S[6], zy = S[7],
-                 zz = S[8];
-    double N[16] = {xx + yy + zz + rest, yz - zy, zx - xz, xy - yx, yz - zy,
-                    xx - yy - zz,        xy + yx, zx + xz, zx - xz, xy + yx,
-                    -xx + yy - zz,       yz + zy, xy - yx, zx + xz, yz + zy,
-                    -xx - yy + zz};
-    double v[16];
-    int best = 0;
-    drape_diagonalise(4, N, v);
-    for (int i = 1; i < 4; i++)
-        best = N[5 * i] > N[5 * best] ? i : best;
-    for (int i = 0; i < 4; i++)
-        q[i] = v[4 * i + best];
-}
-
 static drape_placement fit(const pins *p)
 {
     drape_placement by = {.given = true, .turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
@@ -94,7 +69,21 @@ static drape_placement fit(const pins *p)
     mean_of(p, p->to, to);
     const double spread = correlate(p, from, to, S);
     if (spread > 0) {
-        best_quaternion(S, REST * spread, q);
+        /* The unit quaternion q that makes q' N q largest, for Horn's matrix N of the products S. */
+        const double xx = S[0], xy = S[1], xz = S[2], yx = S[3], yy = S[4], yz = S[5], zx = S[6], zy = S[7],
+                     zz = S[8];
+        const double rest = REST * spread;
+        double N[16] = {xx + yy + zz + rest, yz - zy, zx - xz, xy - yx, yz - zy,
+                        xx - yy - zz,        xy + yx, zx + xz, zx - xz, xy + yx,
+                        -xx + yy - zz,       yz + zy, xy - yx, zx + xz, yz + zy,
+                        -xx - yy + zz};
+        double v[16];
+        int best = 0;
+        drape_diagonalise(4, N, v);
+        for (int i = 1; i < 4; i++)
+            best = N[5 * i] > N[5 * best] ? i : best;
+        for (int i = 0; i < 4; i++)
+            q[i] = v[4 * i + best];
         drape_rotation_of_quaternion(q, by.turn);
     }
     drape_placement_turn(&by, from, turned);
@@ -145,17 +134,6 @@ static void mean_velocity(const drape_sim *sim, const drape_cloth *cloth, int32_
         mean[k] /= sent;
 }
 
-static bool is_sent_too_fast(const drape_sim *sim, const drape_cloth *cloth, int32_t count,
-                             const int32_t *nodes, double seconds, const double *positions)
-{
-    const double *x = drape_sim_state(sim)->x;
-    bool fast = false;
-    for (int32_t i = 0; i < count && !fast; i++)
-        fast = is_in(cloth, nodes[i]) &&
-               exceeds(sim, x + 3 * (size_t)nodes[i], positions + 3 * (size_t)i, seconds);
-    return fast;
-}
-
 /* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That
  * of a cloth does not depend on the others. */
 drape_status drape_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
@@ -169,11 +147,19 @@ drape_status drape_teleport_pins(drape_sim *sim, int32_t count, const int32_t *n
         const int32_t c = i % m->cloth_count;
         const drape_place_list one = {&c, 1};
         double v[3];
-        if (!is_sent_too_fast(sim, &m->cloths[c], count, nodes, seconds, positions))
+        const double *x = drape_sim_state(sim)->x;
+        bool fast = false;
+        for (int32_t k = 0; k < count && !fast; k++) {
+            double path[3];
+            vec3_sub(positions + 3 * (size_t)k, x + 3 * (size_t)nodes[k], path);
+            fast = is_in(&m->cloths[c], nodes[k]) && sim->teleport_speed > 0 &&
+                   vec3_norm(path) > sim->teleport_speed * seconds;
+        }
+        if (!fast)
             continue;
         const pins p = {.model = m,
                         .cloth = &m->cloths[c],
-                        .from = drape_sim_state(sim)->x,
+                        .from = x,
                         .to = targets(sim, count, nodes, seconds, positions)};
         drape_placement by = fit(&p);
         mean_velocity(sim, p.cloth, count, nodes, velocities, &by, v);

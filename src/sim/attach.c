@@ -61,17 +61,6 @@ static drape_status check_triangles(const drape_sim *sim, int32_t collider, int3
     return DRAPE_OK;
 }
 
-/* Pins move with their colliders at once. */
-static void start_riding(drape_sim *sim, int32_t count, const int32_t *nodes)
-{
-    const drape_motion *motion = drape_system_motion(sim->system);
-    drape_state *now = &sim->states[sim->now];
-    for (int32_t i = 0; i < count; i++)
-        drape_motion_pin_velocity(motion, motion->place[nodes[i]], now->t, now->t,
-                                  now->v + 3 * (size_t)nodes[i]);
-    sim->chosen.integrator->restart(sim->integrator, now);
-}
-
 static drape_status carry(drape_sim *sim, int32_t collider, int32_t count, const int32_t *nodes,
                           const int32_t *triangles)
 {
@@ -83,7 +72,13 @@ static drape_status carry(drape_sim *sim, int32_t collider, int32_t count, const
     }
     for (int32_t i = 0; i < count; i++)
         attach(sim, nodes[i], collider, triangles ? triangles[i] : -1, true);
-    start_riding(sim, count, nodes);
+    /* Pins move with their colliders at once. */
+    const drape_motion *motion = drape_system_motion(sim->system);
+    drape_state *now = &sim->states[sim->now];
+    for (int32_t i = 0; i < count; i++)
+        drape_motion_pin_velocity(motion, motion->place[nodes[i]], now->t, now->t,
+                                  now->v + 3 * (size_t)nodes[i]);
+    sim->chosen.integrator->restart(sim->integrator, now);
     drape_sim_shift_energy(sim, &before);
     return DRAPE_OK;
 }
@@ -192,23 +187,6 @@ static void begin_rides(drape_sim *to, const drape_sim *from, const int32_t *bef
     }
 }
 
-static drape_status join_all(drape_sim *to, const joining *join)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t c = 0; !status && c < to->model->collider_count; c++) {
-        int32_t count = 0, *triangles = NULL;
-        for (int32_t i = 0; i < to->model->node_count; i++)
-            if (join->collider[i] == c)
-                join->nodes[count++] = i;
-        if (count > 0)
-            status = find_triangles(to, c, count, join->nodes, &triangles);
-        for (int32_t i = 0; !status && i < count; i++)
-            attach(to, join->nodes[i], c, triangles[i], join->given[join->nodes[i]]);
-        drape_free(to->ctx, triangles);
-    }
-    return status;
-}
-
 drape_status drape_sim_continue_rides(drape_sim *to, const drape_sim *from, const int32_t *before)
 {
     const size_t nodes = (size_t)to->model->node_count;
@@ -223,8 +201,17 @@ drape_status drape_sim_continue_rides(drape_sim *to, const drape_sim *from, cons
         continue_rides(to, from, before, &join);
     if (!status && to->model->ride != from->model->ride)
         begin_rides(to, from, before, &join);
-    if (!status)
-        status = join_all(to, &join);
+    for (int32_t c = 0; !status && c < to->model->collider_count; c++) {
+        int32_t count = 0, *triangles = NULL;
+        for (int32_t i = 0; i < to->model->node_count; i++)
+            if (join.collider[i] == c)
+                join.nodes[count++] = i;
+        if (count > 0)
+            status = find_triangles(to, c, count, join.nodes, &triangles);
+        for (int32_t i = 0; !status && i < count; i++)
+            attach(to, join.nodes[i], c, triangles[i], join.given[join.nodes[i]]);
+        drape_free(to->ctx, triangles);
+    }
     drape_arena_free(&scratch);
     return status;
 }

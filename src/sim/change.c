@@ -96,15 +96,6 @@ drape_status drape_sim_change_model(drape_sim *sim, const drape_model *model)
     return status;
 }
 
-/* The message of a scene goes to its own context. */
-static drape_status compile(drape_sim *sim, drape_scene *scene, drape_model **model)
-{
-    drape_context *own = drape_scene_context(scene);
-    const drape_status status = drape_scene_compile(scene, model);
-    return status && own != sim->ctx ? drape_fail(sim->ctx, status, "%s", drape_context_message(own))
-                                     : status;
-}
-
 drape_status drape_sim_change(drape_sim *sim, drape_scene *scene)
 {
     drape_model *model = NULL;
@@ -113,7 +104,11 @@ drape_status drape_sim_change(drape_sim *sim, drape_scene *scene)
         return status;
     if (!scene)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_change: the scene is NULL");
-    status = compile(sim, scene, &model);
+    /* The message of a scene goes to its own context. */
+    drape_context *own = drape_scene_context(scene);
+    const drape_status compiled = drape_scene_compile(scene, &model);
+    status = compiled && own != sim->ctx ? drape_fail(sim->ctx, compiled, "%s", drape_context_message(own))
+                                         : compiled;
     if (!status)
         status = drape_sim_change_model(sim, model);
     if (status)

@@ -19,18 +19,6 @@
 
 /* ---- States ---- */
 
-static void archive_state(const drape_model *m, drape_state *state, drape_archive *a)
-{
-    size_t n = 3 * (size_t)m->node_count;
-    drape_archive_double(a, &state->t);
-    drape_archive_nodes(a, m, state->x);
-    drape_archive_nodes(a, m, state->v);
-    drape_archive_internal(a, m, state->internal);
-    if (drape_archive_has_read(a) &&
-        !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
-}
-
 static bool is_place(int index, int least, int count)
 {
     return index >= least && index < count;
@@ -41,6 +29,7 @@ static bool is_place(int index, int least, int count)
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
     const int count = 2 + sim->chosen.controller->history_depth;
+    const size_t n = 3 * (size_t)sim->model->node_count;
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {
@@ -53,19 +42,19 @@ static void archive_states(drape_sim *sim, drape_archive *a)
         (sim->next == sim->now || sim->next == sim->past[0] || sim->next == sim->past[1]))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no state to step to");
     for (int i = 0; i < count && drape_archive_good(a); i++)
-        if (i == sim->now || i == sim->before || i == sim->past[0] || i == sim->past[1])
-            archive_state(sim->model, &sim->states[i], a);
+        if (i == sim->now || i == sim->before || i == sim->past[0] || i == sim->past[1]) {
+            drape_state *state = &sim->states[i];
+            drape_archive_double(a, &state->t);
+            drape_archive_nodes(a, sim->model, state->x);
+            drape_archive_nodes(a, sim->model, state->v);
+            drape_archive_internal(a, sim->model, state->internal);
+            if (drape_archive_has_read(a) &&
+                !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
+        }
 }
 
 /* ---- State of the driver ---- */
-
-/* Checks what the loops over steps and frames depend on to end. */
-static bool is_schedule(const drape_schedule *s)
-{
-    return s->level >= 0 && s->level <= DRAPE_SCHEDULE_LEVELS && s->part >= 0 &&
-           s->part < (int64_t)1 << s->level && s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
-           (!s->cut || (isfinite(s->cut_end) && s->cut_end > s->now));
-}
 
 static void archive_schedule(drape_schedule *s, drape_archive *a)
 {
@@ -81,16 +70,12 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_bool(a, &s->stepped);
     drape_archive_bool(a, &s->anew);
     drape_archive_bool(a, &s->cut);
-    if (drape_archive_good(a) && !is_schedule(s))
+    /* Checks what the loops over steps and frames depend on to end. */
+    if (drape_archive_good(a) &&
+        !(s->level >= 0 && s->level <= DRAPE_SCHEDULE_LEVELS && s->part >= 0 &&
+          s->part < (int64_t)1 << s->level && s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
+          (!s->cut || (isfinite(s->cut_end) && s->cut_end > s->now))))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
-}
-
-static void archive_energy(drape_energy *e, drape_archive *a)
-{
-    double *const parts[] = {&e->kinetic, &e->elastic,    &e->gravity,
-                             &e->contact, &e->dissipated, &e->numerical};
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        drape_archive_double(a, parts[i]);
 }
 
 static void archive_audit(drape_sim *sim, drape_archive *a)
@@ -104,7 +89,10 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
     for (size_t i = 0; i < sizeof sums / sizeof *sums; i++)
         drape_archive_double(a, sums[i]);
     drape_archive_bool(a, &sim->energy_known);
-    archive_energy(&sim->energy, a);
+    double *const parts[] = {&sim->energy.kinetic, &sim->energy.elastic,    &sim->energy.gravity,
+                             &sim->energy.contact, &sim->energy.dissipated, &sim->energy.numerical};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        drape_archive_double(a, parts[i]);
 }
 
 /* A counted reason is static text; a reason that was read is stored in the sim's arena. */
@@ -119,18 +107,6 @@ static void archive_reason(drape_sim *sim, drape_reason_total *reason, drape_arc
     reason->reason = drape_arena_text(sim->arena, text);
     if (!reason->reason)
         drape_archive_note(a, DRAPE_E_MEMORY);
-}
-
-static void archive_reasons(drape_sim *sim, drape_archive *a)
-{
-    int count = sim->reason_count;
-    drape_archive_int(a, &count);
-    if (drape_archive_good(a) && !is_place(count, 0, DRAPE_MAX_REASONS + 1))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d reasons for rejections", count);
-    for (int i = 0; i < count && drape_archive_good(a); i++) {
-        archive_reason(sim, &sim->reasons[i], a);
-        sim->reason_count = drape_archive_good(a) ? i + 1 : i;
-    }
 }
 
 /* Whether the next frame lies within the last step. A steady-state integrator has only the first frame. */
@@ -156,7 +132,14 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
         drape_archive_int64(a, counts[i]);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
-    archive_reasons(sim, a);
+    int count = sim->reason_count;
+    drape_archive_int(a, &count);
+    if (drape_archive_good(a) && !is_place(count, 0, DRAPE_MAX_REASONS + 1))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d reasons for rejections", count);
+    for (int i = 0; i < count && drape_archive_good(a); i++) {
+        archive_reason(sim, &sim->reasons[i], a);
+        sim->reason_count = drape_archive_good(a) ? i + 1 : i;
+    }
     if (drape_archive_has_read(a) && !is_next_frame(sim))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
 }

@@ -44,17 +44,6 @@ static void copy_internal(const drape_model *to, const drape_model *from, const 
     }
 }
 
-static void copy_state(drape_sim *to, const drape_sim *from)
-{
-    const size_t n = 3 * (size_t)to->model->node_count;
-    const drape_state *now = drape_sim_state(from);
-    drape_state *state = &to->states[to->now];
-    state->t = now->t;
-    memcpy(state->x, now->x, n * sizeof *state->x);
-    memcpy(state->v, now->v, n * sizeof *state->v);
-    copy_internal(to->model, from->model, now->internal, state->internal);
-}
-
 /* ---- Pins ---- */
 
 /* A released node goes on with the velocity that its pin had in the last step. */
@@ -121,16 +110,6 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
 
 /* ---- The driver ---- */
 
-static drape_status copy_reasons(drape_sim *to, const drape_sim *from)
-{
-    to->reason_count = from->reason_count;
-    for (int i = 0; i < from->reason_count; i++) {
-        to->reasons[i].count = from->reasons[i].count;
-        to->reasons[i].reason = drape_arena_text(to->arena, from->reasons[i].reason);
-    }
-    return drape_arena_status(to->arena);
-}
-
 /* Contact may need memory to measure its energy. */
 static drape_status measured(drape_sim *sim)
 {
@@ -163,29 +142,35 @@ static drape_status copy_driver(drape_sim *to, drape_sim *from, const int32_t *b
     if (status)
         return status;
     drape_events_continue(to, from);
-    return copy_reasons(to, from);
+    to->reason_count = from->reason_count;
+    for (int i = 0; i < from->reason_count; i++) {
+        to->reasons[i].count = from->reasons[i].count;
+        to->reasons[i].reason = drape_arena_text(to->arena, from->reasons[i].reason);
+    }
+    return drape_arena_status(to->arena);
 }
 
 /* ---- All of it ---- */
-
-/* before (collider_count of `to`): the number that each collider had; -1: it is new. */
-static void match_colliders(const drape_model *to, const drape_model *from, int32_t *before)
-{
-    for (int32_t c = 0; c < to->collider_count; c++) {
-        before[c] = -1;
-        for (int32_t k = 0; before[c] < 0 && k < from->collider_count; k++)
-            if (strcmp(to->colliders[c].name, from->colliders[k].name) == 0)
-                before[c] = k;
-    }
-}
 
 static drape_status go_on(drape_sim *to, drape_sim *from)
 {
     int32_t *before = drape_alloc(to->ctx, (size_t)to->model->collider_count + 1, sizeof *before);
     if (!before)
         return DRAPE_E_MEMORY;
-    match_colliders(to->model, from->model, before);
-    copy_state(to, from);
+    /* The number that each collider of `to` had; -1: it is new. */
+    for (int32_t c = 0; c < to->model->collider_count; c++) {
+        before[c] = -1;
+        for (int32_t k = 0; before[c] < 0 && k < from->model->collider_count; k++)
+            if (strcmp(to->model->colliders[c].name, from->model->colliders[k].name) == 0)
+                before[c] = k;
+    }
+    const size_t n = 3 * (size_t)to->model->node_count;
+    const drape_state *now = drape_sim_state(from);
+    drape_state *state = &to->states[to->now];
+    state->t = now->t;
+    memcpy(state->x, now->x, n * sizeof *state->x);
+    memcpy(state->v, now->v, n * sizeof *state->v);
+    copy_internal(to->model, from->model, now->internal, state->internal);
     let_go(to, from);
     drape_status status = drape_system_continue(to->system, from->system, before, drape_sim_state(from)->t);
     if (!status)

@@ -28,18 +28,6 @@ static drape_status check(const drape_sim *sim, const char *function, int32_t no
     return DRAPE_OK;
 }
 
-static void replace(drape_sim *sim, const drape_drag_springs *springs)
-{
-    const double *x = drape_sim_state(sim)->x;
-    const double work = drape_drag_springs_energy(springs, x) -
-                        drape_drag_springs_energy(drape_system_drag_springs(sim->system), x);
-    drape_system_set_drag_springs(sim->system, springs);
-    sim->audit.pin_work += work;
-    sim->audit.offered += fabs(work);
-    sim->energy_known = sim->attempted_known = false;
-    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-}
-
 /* Springs without stiffness are left out. */
 static drape_status set(drape_sim *sim, const char *function, int32_t count, const int32_t *nodes,
                         const double *stiffness, const double *targets)
@@ -56,8 +44,16 @@ static drape_status set(drape_sim *sim, const char *function, int32_t count, con
         spring->stiffness = stiffness[i];
         memcpy(spring->target, target, sizeof spring->target);
     }
-    if (!status)
-        replace(sim, &springs);
+    if (!status) {
+        const double *x = drape_sim_state(sim)->x;
+        const double work = drape_drag_springs_energy(&springs, x) -
+                            drape_drag_springs_energy(drape_system_drag_springs(sim->system), x);
+        drape_system_set_drag_springs(sim->system, &springs);
+        sim->audit.pin_work += work;
+        sim->audit.offered += fabs(work);
+        sim->energy_known = sim->attempted_known = false;
+        sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    }
     return status;
 }
 

@@ -40,15 +40,6 @@ static void products(const frame *f, const double *d, double by[3])
     by[2] = vec3_dot(d, f->n);
 }
 
-/* a and b of the d = a u + b v + h n that has these products. */
-static void resolve(const frame *f, const double by[3], double *a, double *b)
-{
-    const double uu = vec3_dot(f->u, f->u), uv = vec3_dot(f->u, f->v), vv = vec3_dot(f->v, f->v),
-                 area = uu * vv - uv * uv;
-    *a = area > 0 ? (vv * by[0] - uv * by[1]) / area : 0;
-    *b = area > 0 ? (uu * by[1] - uv * by[0]) / area : 0;
-}
-
 static void to_double(const float *from, double to[3])
 {
     for (int k = 0; k < 3; k++)
@@ -129,8 +120,12 @@ drape_status drape_embedding_create(drape_context *ctx, const drape_model *model
 /* A normal keeps its products with what is tangent to the surface. */
 static void carry_normal(const fixture *at, const frame *f, float normal[3])
 {
-    double n[3] = {0}, a, b;
-    resolve(f, at->normal, &a, &b);
+    double n[3] = {0};
+    /* The d = a u + b v + h n that has these products. */
+    const double uu = vec3_dot(f->u, f->u), uv = vec3_dot(f->u, f->v), vv = vec3_dot(f->v, f->v),
+                 area = uu * vv - uv * uv;
+    const double a = area > 0 ? (vv * at->normal[0] - uv * at->normal[1]) / area : 0,
+                 b = area > 0 ? (uu * at->normal[1] - uv * at->normal[0]) / area : 0;
     vec3_add_scaled(a, f->u, n);
     vec3_add_scaled(b, f->v, n);
     vec3_add_scaled(at->normal[2], f->n, n);

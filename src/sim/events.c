@@ -176,14 +176,6 @@ static drape_status evaluate_at(void *user, double t, double *f)
     return evaluate(&m, c->watch, f);
 }
 
-static void insert(course *c, point p)
-{
-    int k = c->count++;
-    for (; c->points[k - 1].t > p.t; k--)
-        c->points[k] = c->points[k - 1];
-    c->points[k] = p;
-}
-
 /* If the cubic through the samples comes near 0 at s (of the step), between two of them of one sign,
  * evaluates the function there. */
 static drape_status look_at(course *c, const double a[4], double s)
@@ -195,8 +187,12 @@ static drape_status look_at(course *c, const double a[4], double s)
         return DRAPE_OK;
     point p = {.t = c->points[0].t + s * (c->next->t - c->points[0].t)};
     const drape_status status = evaluate_at(c, p.t, &p.f);
-    if (!status && p.t > c->points[0].t && p.t < c->next->t)
-        insert(c, p);
+    if (!status && p.t > c->points[0].t && p.t < c->next->t) {
+        int i = c->count++;
+        for (; c->points[i - 1].t > p.t; i--)
+            c->points[i] = c->points[i - 1];
+        c->points[i] = p;
+    }
     return status;
 }
 
@@ -304,11 +300,12 @@ static double change_in_tolerance(const drape_watch *w, double h, double t)
     return fabs(w->sample[3] - w->sample[2]) / (h / 3) * tolerance_at(t);
 }
 
-/* Events that would have their root less than the tolerance after the end have it at the end: so one that is
- * recorded is, also where another one stops the run. */
-static void take_near_roots(drape_sim *sim, const drape_state *next, int32_t also)
+/* The step ends here: roots of events that act and lie less than the tolerance before its end are there. */
+static drape_event_verdict end_here(drape_sim *sim, const drape_state *next, int32_t also)
 {
     drape_event_set *e = &sim->events;
+    /* Events that would have their root less than the tolerance after the end have it at the end: so one
+     * that is recorded is, also where another one stops the run. */
     const double h = next->t - drape_sim_state(sim)->t;
     for (int32_t i = 0; i < e->count; i++) {
         drape_watch *w = &e->watches[i];
@@ -320,13 +317,6 @@ static void take_near_roots(drape_sim *sim, const drape_state *next, int32_t als
         w->side_after = -w->side_after;
         add(sim, &(course){.watch = w}, next->t, f, w->side_after);
     }
-}
-
-/* The step ends here: roots of events that act and lie less than the tolerance before its end are there. */
-static drape_event_verdict end_here(drape_sim *sim, const drape_state *next, int32_t also)
-{
-    drape_event_set *e = &sim->events;
-    take_near_roots(sim, next, also);
     for (int32_t i = 0; i < e->pending_count; i++)
         if (acts(&e->watches[e->pending[i].event])) {
             e->pending[i].root.t = next->t;
@@ -624,17 +614,6 @@ static drape_status add_watch(drape_sim *sim, const drape_watch *watch)
     return DRAPE_OK;
 }
 
-/* The texts of the def are copied. */
-static drape_status copy_def(drape_sim *sim, const drape_event_def *from, drape_event_def *to)
-{
-    const char **const texts[] = {&to->name, &to->cloth, &to->pins, &to->direction, &to->action};
-    *to = *from;
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
-        if (*texts[i])
-            *texts[i] = drape_arena_text(sim->arena, *texts[i]);
-    return drape_arena_status(sim->arena);
-}
-
 static drape_status add_function(drape_sim *sim, const drape_event_def *def, drape_event_function *function,
                                  void *user)
 {
@@ -644,8 +623,16 @@ static drape_status add_function(drape_sim *sim, const drape_event_def *def, dra
         return DRAPE_E_MEMORY;
     drape_status status = drape_compile_host_event(sim->ctx, sim->arena, sim->model, def, event);
     watch.event = event;
-    if (!status)
-        status = copy_def(sim, def, &watch.def);
+    if (!status) {
+        /* The texts of the def are copied. */
+        const char **const texts[] = {&watch.def.name, &watch.def.cloth, &watch.def.pins,
+                                      &watch.def.direction, &watch.def.action};
+        watch.def = *def;
+        for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+            if (*texts[i])
+                *texts[i] = drape_arena_text(sim->arena, *texts[i]);
+        status = drape_arena_status(sim->arena);
+    }
     return status ? status : add_watch(sim, &watch);
 }
 

@@ -401,15 +401,6 @@ drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
     return read_status(sim);
 }
 
-/* The forces of contact on a collider, with the sign of g. */
-static drape_status read_load(drape_sim *sim, const drape_point *point, int32_t collider, drape_load *load)
-{
-    drape_system_contact_part(sim->system, point, true, sim->query_scratch, NULL);
-    const drape_load *on = drape_system_on_colliders(sim->system);
-    *load = on ? on[collider] : (drape_load){.force = {0}};
-    return read_status(sim);
-}
-
 /* What the pins that a collider carries put on it: the sum of their forces and its moment about a point. */
 static drape_status add_carried(drape_sim *sim, const drape_point *point, int32_t collider,
                                 const double about[3], double force[3], double moment[3])
@@ -447,8 +438,13 @@ static drape_status read_wrench(drape_sim *sim, const char *function, int32_t co
         status = check_has_contact(sim, function);
     if (!status)
         status = place(sim, &point);
-    if (!status)
-        status = read_load(sim, &point, collider, &load);
+    if (!status) {
+        /* The forces of contact on a collider, with the sign of g. */
+        drape_system_contact_part(sim->system, &point, true, sim->query_scratch, NULL);
+        const drape_load *on = drape_system_on_colliders(sim->system);
+        load = on ? on[collider] : (drape_load){.force = {0}};
+        status = read_status(sim);
+    }
     if (status)
         return status;
     drape_motion_pose(drape_system_motion(sim->system), collider, point.t, point.t, &pose);

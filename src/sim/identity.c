@@ -150,12 +150,6 @@ static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
     return add_doubles(hash, values, sizeof values / sizeof *values);
 }
 
-static uint64_t add_untangle(uint64_t hash, const drape_model_untangle *u)
-{
-    const double values[] = {u->given, u->goes_on};
-    return add_doubles(hash, values, sizeof values / sizeof *values);
-}
-
 static uint64_t add_nodes(uint64_t hash, const drape_model *m)
 {
     size_t nodes = (size_t)m->node_count;
@@ -218,7 +212,8 @@ uint64_t drape_model_identity(const drape_model *m)
         hash = add_event(hash, &m->events[i]);
     if (m->ignored)
         hash = add(hash, m->ignored, (size_t)(m->collider_count + m->cloth_count) * (size_t)m->cloth_count);
-    hash = add_untangle(hash, &m->untangle);
+    const double values[] = {m->untangle.given, m->untangle.goes_on};
+    hash = add_doubles(hash, values, sizeof values / sizeof *values);
     return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
 }
 
@@ -248,25 +243,6 @@ void drape_sim_describe_libraries(char *text, size_t size)
         used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_names[i]);
 }
 
-static void describe_build(char *text, size_t size)
-{
-    char libraries[DRAPE_ARCHIVE_TEXT / 2];
-    drape_sim_describe_libraries(libraries, sizeof libraries);
-    snprintf(text, size, "Drape %s, arithmetic %016" PRIx64 ", compiler %s, %s", drape_version(),
-             drape_arithmetic_hash(), __VERSION__, libraries);
-}
-
-static void archive_build(drape_archive *a)
-{
-    char here[DRAPE_ARCHIVE_TEXT], there[DRAPE_ARCHIVE_TEXT];
-    describe_build(here, sizeof here);
-    memcpy(there, here, sizeof there);
-    drape_archive_text(a, there, sizeof there);
-    if (drape_archive_good(a) && strcmp(there, here) != 0)
-        drape_archive_fail(a, DRAPE_E_VERSION, "the checkpoint is of another build (%.150s); this is %.150s",
-                           there, here);
-}
-
 static void archive_name(drape_archive *a, const char *what, const char *name)
 {
     char there[DRAPE_ARCHIVE_TEXT];
@@ -287,22 +263,6 @@ static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
                            hash);
 }
 
-/* Whether several ranks share the model, which any number of them can then read. */
-static void archive_kind(drape_archive *a, bool by_ranks)
-{
-    char kind[DRAPE_ARCHIVE_TEXT];
-    snprintf(kind, sizeof kind, by_ranks ? "ranks" : "identity");
-    drape_archive_text(a, kind, sizeof kind);
-    a->by_ranks = strcmp(kind, "ranks") == 0;
-    if (drape_archive_good(a) && !a->by_ranks && strcmp(kind, "identity") != 0)
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has \"%s\" where \"identity\" is expected",
-                           kind);
-    if (drape_archive_good(a) && by_ranks && !a->by_ranks)
-        drape_archive_fail(
-            a, DRAPE_E_ARGUMENT,
-            "the checkpoint is of a run of one process, which remembers what several ranks cannot");
-}
-
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
 {
     const drape_model *m = drape_sim_base_model(sim);
@@ -311,8 +271,28 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
         sim->choices_hash = choices_hash(sim);
         sim->identity_known = true;
     }
-    archive_kind(a, m->part != NULL);
-    archive_build(a);
+    /* Whether several ranks share the model, which any number of them can then read. */
+    char kind[DRAPE_ARCHIVE_TEXT];
+    snprintf(kind, sizeof kind, m->part ? "ranks" : "identity");
+    drape_archive_text(a, kind, sizeof kind);
+    a->by_ranks = strcmp(kind, "ranks") == 0;
+    if (drape_archive_good(a) && !a->by_ranks && strcmp(kind, "identity") != 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has \"%s\" where \"identity\" is expected",
+                           kind);
+    if (drape_archive_good(a) && m->part && !a->by_ranks)
+        drape_archive_fail(
+            a, DRAPE_E_ARGUMENT,
+            "the checkpoint is of a run of one process, which remembers what several ranks cannot");
+    char here[DRAPE_ARCHIVE_TEXT], there[DRAPE_ARCHIVE_TEXT];
+    char libraries[DRAPE_ARCHIVE_TEXT / 2];
+    drape_sim_describe_libraries(libraries, sizeof libraries);
+    snprintf(here, sizeof here, "Drape %s, arithmetic %016" PRIx64 ", compiler %s, %s", drape_version(),
+             drape_arithmetic_hash(), __VERSION__, libraries);
+    memcpy(there, here, sizeof there);
+    drape_archive_text(a, there, sizeof there);
+    if (drape_archive_good(a) && strcmp(there, here) != 0)
+        drape_archive_fail(a, DRAPE_E_VERSION, "the checkpoint is of another build (%.150s); this is %.150s",
+                           there, here);
     archive_name(a, "integrator", sim->chosen.integrator->entry.name);
     archive_name(a, "controller", sim->chosen.controller->entry.name);
     drape_archive_same(a, "the number of nodes", drape_model_node_count(m));

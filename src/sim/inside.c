@@ -85,20 +85,17 @@ static drape_status intersect(drape_arena *arena, search *s)
 
 /* ---- Triangles ---- */
 
-static bool side_crosses(const search *s, int32_t a, int32_t b)
-{
-    const int32_t edge = drape_edge_between(s->model->edge, s->model->edge_count, a, b);
-    return edge >= 0 && s->edge_crosses[edge];
-}
-
 static bool is_pierced(const search *s, int32_t triangle)
 {
     const int32_t *node = s->model->triangle + 3 * (size_t)triangle;
     if (s->found->intersections == 0)
         return false;
     bool crossed = s->pierced[triangle] > 0;
-    for (int a = 0; a < 3 && !crossed; a++)
-        crossed = side_crosses(s, node[a], node[(a + 1) % 3]);
+    for (int a = 0; a < 3 && !crossed; a++) {
+        const int32_t edge =
+            drape_edge_between(s->model->edge, s->model->edge_count, node[a], node[(a + 1) % 3]);
+        crossed = edge >= 0 && s->edge_crosses[edge];
+    }
     return crossed;
 }
 

@@ -21,16 +21,6 @@ static drape_status check_masses(const drape_sim *sim, int32_t count, const int3
     return status;
 }
 
-static drape_status reweigh(drape_sim *sim, const double *masses)
-{
-    const drape_model *base = drape_sim_base_model(sim);
-    const bool as_compiled = memcmp(masses, base->mass, (size_t)base->node_count * sizeof *masses) == 0;
-    const drape_status status = drape_sim_remake(sim, base, sim->pinned, as_compiled ? NULL : masses);
-    if (!status)
-        drape_events_forget(sim);
-    return status;
-}
-
 drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *nodes, const double *masses)
 {
     drape_status status = drape_sim_guard(sim, "drape_sim_set_masses");
@@ -45,8 +35,13 @@ drape_status drape_sim_set_masses(drape_sim *sim, int32_t count, const int32_t *
     memcpy(changed, sim->model->mass, size);
     for (int32_t i = 0; i < count; i++)
         changed[nodes[i]] = masses[i];
-    if (memcmp(changed, sim->model->mass, size) != 0)
-        status = reweigh(sim, changed);
+    if (memcmp(changed, sim->model->mass, size) != 0) {
+        const drape_model *base = drape_sim_base_model(sim);
+        const bool as_compiled = memcmp(changed, base->mass, (size_t)base->node_count * sizeof *changed) == 0;
+        status = drape_sim_remake(sim, base, sim->pinned, as_compiled ? NULL : changed);
+        if (!status)
+            drape_events_forget(sim);
+    }
     drape_free(sim->ctx, changed);
     return status;
 }

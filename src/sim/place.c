@@ -136,16 +136,6 @@ static void place_nodes(const drape_sim *sim, const drape_place_list *cloths, co
     }
 }
 
-/* Springs by which a host drags nodes go with them. */
-static void place_drag_springs(drape_sim *sim, const drape_place_list *cloths, const drape_placement *by)
-{
-    drape_drag_springs springs = *drape_system_drag_springs(sim->system);
-    for (int32_t i = 0; i < springs.count; i++)
-        if (has(cloths, drape_model_cloth_of(sim->model, springs.spring[i].node)))
-            drape_placement_move(by, springs.spring[i].target, springs.spring[i].target);
-    drape_system_set_drag_springs(sim->system, &springs);
-}
-
 static void place_motion(drape_sim *sim, const drape_place_list *cloths, const drape_place_list *colliders,
                          const drape_placement *by)
 {
@@ -177,7 +167,12 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
         return status;
     const drape_energy before = drape_sim_energy(sim);
     place_nodes(sim, cloths, by, stop, next);
-    place_drag_springs(sim, cloths, by);
+    /* Springs by which a host drags nodes go with them. */
+    drape_drag_springs springs = *drape_system_drag_springs(sim->system);
+    for (int32_t i = 0; i < springs.count; i++)
+        if (has(cloths, drape_model_cloth_of(sim->model, springs.spring[i].node)))
+            drape_placement_move(by, springs.spring[i].target, springs.spring[i].target);
+    drape_system_set_drag_springs(sim->system, &springs);
     place_motion(sim, cloths, colliders, by);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
@@ -211,18 +206,6 @@ static drape_status read_def(const drape_sim *sim, const drape_place_def *given,
     return DRAPE_OK;
 }
 
-/* Pins whose cloth was placed without the collider that carries them, or that without them, stay where they
- * are, so that nothing is strained, and ride on from there. */
-static void keep_riding(drape_sim *sim, const drape_place_list *cloths, const drape_place_list *colliders)
-{
-    const drape_motion *motion = drape_system_motion(sim->system);
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        const int32_t on = drape_motion_carrier(motion, i), node = motion->moved_node[i];
-        if (on >= 0 && has(colliders, on) != has(cloths, drape_model_cloth_of(sim->model, node)))
-            drape_sim_ride_on(sim, node);
-    }
-}
-
 /* R (x - c) + c + t. Without a rotation c cancels exactly. */
 static drape_placement placement_of(const drape_place_def *def)
 {
@@ -252,7 +235,15 @@ drape_status drape_sim_place(drape_sim *sim, const drape_place_def *given)
         status = check_list(sim, "collider", &colliders, sim->model->collider_count);
     if (!status)
         status = drape_sim_place_parts(sim, &cloths, &colliders, &by, def.stop);
-    if (!status)
-        keep_riding(sim, &cloths, &colliders);
+    if (!status) {
+        /* Pins whose cloth was placed without the collider that carries them, or that without them, stay
+         * where they are, so that nothing is strained, and ride on from there. */
+        const drape_motion *motion = drape_system_motion(sim->system);
+        for (int32_t i = 0; i < motion->moved_count; i++) {
+            const int32_t on = drape_motion_carrier(motion, i), node = motion->moved_node[i];
+            if (on >= 0 && has(&colliders, on) != has(&cloths, drape_model_cloth_of(sim->model, node)))
+                drape_sim_ride_on(sim, node);
+        }
+    }
     return status;
 }

@@ -35,26 +35,20 @@ typedef struct bench {
 
 /* ---- The state ---- */
 
-static void deform(bench *s, double dt)
+/* Evaluates as in a step of size dt from the state of the sim. */
+static void set_point(bench *s, double dt)
 {
-    const drape_model *model = s->sim->model;
     const drape_state *from = drape_sim_state(s->sim);
-    double size = DEFORMATION * drape_model_mean_edge(model);
+    const drape_model *model = s->sim->model;
+    double shift = DEFORMATION * drape_model_mean_edge(model);
     uint64_t seed = 1;
     for (size_t i = 0; i < 3 * (size_t)model->node_count; i++) {
-        double d = model->pinned[i / 3] ? 0 : size * drape_grid_random(&seed);
+        double d = model->pinned[i / 3] ? 0 : shift * drape_grid_random(&seed);
         s->x[i] = from->x[i] + d;
         s->v[i] = from->v[i] + d / dt;
     }
     for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++)
         s->b[i] = drape_grid_random(&seed);
-}
-
-/* Evaluates as in a step of size dt from the state of the sim. */
-static void set_point(bench *s, double dt)
-{
-    const drape_state *from = drape_sim_state(s->sim);
-    deform(s, dt);
     if (s->history) {
         drape_system_measures(s->sim->system,
                               &(drape_point){.x = from->x, .internal = from->internal, .t = from->t},
@@ -181,15 +175,6 @@ static size_t term_bytes(const drape_term *term)
     return bytes;
 }
 
-static int64_t count_measures(const drape_model *model, int32_t cloth)
-{
-    int64_t count = 0;
-    for (int32_t i = 0; i < model->term_count; i++)
-        if (model->terms[i].cloth == cloth && model->terms[i].seam < 0 && model->terms[i].ops->measure)
-            count += model->terms[i].elements.count;
-    return count;
-}
-
 static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *terms)
 {
     const drape_model *model = s->sim->model;
@@ -205,9 +190,11 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
         const drape_term *term = &model->terms[i];
         drape_profile_term *p = &terms[i];
         *p = (drape_profile_term){.nonzeros = count_nonzeros(term, seen, blocks), .bytes = term_bytes(term)};
-        if (term->ops->law)
-            p->acts_on = count_measures(model, term->cloth);
-        else
+        if (term->ops->law) {
+            for (const drape_term *t = model->terms; t < model->terms + model->term_count; t++)
+                if (t->cloth == term->cloth && t->seam < 0 && t->ops->measure)
+                    p->acts_on += t->elements.count;
+        } else
             p->residual_seconds = shortest(s, term_residual);
         if (implicit && term->block)
             p->jacobian_seconds = shortest(s, term_jacobian);
@@ -233,16 +220,6 @@ static void count_bytes(const drape_sim *sim, drape_profile *out)
         sizeof *sim + sizeof *sim->arena + sim->arena->bytes - sim->state_bytes - sim->integrator_bytes;
 }
 
-static void report_solver(const bench *s, drape_profile *out)
-{
-    drape_linear_report report = {.ops = s->linear};
-    if (s->linear->report)
-        s->linear->report(s->solver, &report);
-    out->linear_picked = report.ops->entry.name;
-    out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
-    memcpy(out->linear_why, report.why, sizeof out->linear_why);
-}
-
 /* The integrator's solver has no factors before the first step: a solver with the same pattern measures
  * what they will take. */
 static drape_status measure_solver(bench *s, drape_profile *out)
@@ -257,7 +234,12 @@ static drape_status measure_solver(bench *s, drape_profile *out)
         out->integrator_bytes += s->arena.bytes + drape_linear_bytes(s->linear, s->solver) - before;
         out->solve_seconds = shortest(s, solve);
     }
-    report_solver(s, out);
+    drape_linear_report report = {.ops = s->linear};
+    if (s->linear->report)
+        s->linear->report(s->solver, &report);
+    out->linear_picked = report.ops->entry.name;
+    out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
+    memcpy(out->linear_why, report.why, sizeof out->linear_why);
     drape_linear_destroy(s->linear, &s->solver);
     return DRAPE_OK;
 }

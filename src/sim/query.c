@@ -206,14 +206,6 @@ static drape_status fit_tree(drape_sim *sim, int what)
     return status;
 }
 
-static bool is_met(const drape_model *m, int32_t collider)
-{
-    bool met = false;
-    for (int32_t i = 0; i < m->cloth_count; i++)
-        met = met || !drape_model_ignores(m, collider, m->cloths[i].first_node);
-    return met;
-}
-
 /* Fits what is asked about to the present state. */
 static drape_status begin_query(drape_sim *sim, int what, query *q)
 {
@@ -224,10 +216,14 @@ static drape_status begin_query(drape_sim *sim, int what, query *q)
         return status;
     q->body = drape_arena_take(&q->arena, (size_t)m->collider_count, sizeof *q->body);
     status = q->body ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (int32_t c = 0; !status && c < m->collider_count; c++)
-        if (is_met(m, c))
+    for (int32_t c = 0; !status && c < m->collider_count; c++) {
+        bool met = false;
+        for (int32_t i = 0; i < m->cloth_count; i++)
+            met = met || !drape_model_ignores(m, c, m->cloths[i].first_node);
+        if (met)
             status = drape_deformed_at(&q->arena, m, drape_system_motion(sim->system), c,
                                        drape_sim_state(sim)->t, &q->body[c]);
+    }
     return status;
 }
 
@@ -244,25 +240,21 @@ drape_status drape_sim_closest(drape_sim *sim, int what, int32_t count, const do
     return status;
 }
 
-static drape_status check_directions(const drape_sim *sim, int32_t count, const double *directions,
-                                     double length)
-{
-    bool good = isfinite(length) && (count == 0 || directions);
-    double direction[3];
-    for (int32_t i = 0; good && i < count; i++)
-        good = normalise(directions + 3 * (size_t)i, direction);
-    return good ? DRAPE_OK
-                : drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                             "drape_sim_cast: directions and length must be finite, and no direction 0");
-}
-
 drape_status drape_sim_cast(drape_sim *sim, int what, int32_t count, const double *origins,
                             const double *directions, double length, drape_hit *hits)
 {
     query q = {.arena = drape_arena_of(sim ? sim->ctx : NULL)};
     drape_status status = check(sim, "drape_sim_cast", what, count, origins, length, hits);
-    if (!status)
-        status = check_directions(sim, count, directions, length);
+    if (!status) {
+        bool good = isfinite(length) && (count == 0 || directions);
+        double direction[3];
+        for (int32_t i = 0; good && i < count; i++)
+            good = normalise(directions + 3 * (size_t)i, direction);
+        status = good
+                     ? DRAPE_OK
+                     : drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                                  "drape_sim_cast: directions and length must be finite, and no direction 0");
+    }
     if (!status)
         status = begin_query(sim, what, &q);
     for (int32_t i = 0; !status && i < count; i++)

@@ -72,13 +72,6 @@ static void open_interval(drape_schedule *s)
     s->interval_size = cut ? s->end - t0 : joined ? s->dt + beyond : s->dt;
 }
 
-static bool next_free(const drape_schedule *s, double *t1, double *h)
-{
-    *t1 = s->cut ? s->cut_end : s->end;
-    *h = fmin(*t1 - s->now, s->limit);
-    return s->end - s->now > least_remainder(s);
-}
-
 /* The rest of the advance is covered by one step if one suffices, or by two halves if two do, so that no
  * tiny step is left over. */
 static bool next_proposed(const drape_schedule *s, double *t1, double *h)
@@ -113,7 +106,9 @@ static bool propose(drape_schedule *s, double *t1, double *h)
 {
     switch (s->stepping) {
     case DRAPE_STEPS_FREE:
-        return next_free(s, t1, h);
+        *t1 = s->cut ? s->cut_end : s->end;
+        *h = fmin(*t1 - s->now, s->limit);
+        return s->end - s->now > least_remainder(s);
     case DRAPE_STEPS_PROPOSED:
         return next_proposed(s, t1, h);
     case DRAPE_STEPS_COUNTED:
@@ -129,30 +124,6 @@ bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
     return more;
 }
 
-static void close_interval(drape_schedule *s)
-{
-    s->part = 0;
-    s->count++;
-    s->cut = false;
-    if (s->anew) {
-        s->start = s->interval_end;
-        s->count = 0;
-    }
-}
-
-/* The level is lowered as soon as the finished parts make up whole parts of the lower level. */
-static void accept_part(drape_schedule *s, bool grow)
-{
-    s->part++;
-    bool whole = s->part == (int64_t)1 << s->level;
-    if (grow && s->level > 0 && s->part % 2 == 0) {
-        s->level--;
-        s->part /= 2;
-    }
-    if (whole)
-        close_interval(s);
-}
-
 void drape_schedule_accept(drape_schedule *s, double t1, double h_next, bool grow)
 {
     s->now = t1;
@@ -163,9 +134,24 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next, bool gro
     }
     s->stepped = true;
     s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
-    if (s->stepping == DRAPE_STEPS_COUNTED)
-        accept_part(s, grow);
-    else if (t1 >= s->cut_end)
+    if (s->stepping == DRAPE_STEPS_COUNTED) {
+        /* The level is lowered as soon as the finished parts make up whole parts of the lower level. */
+        s->part++;
+        bool whole = s->part == (int64_t)1 << s->level;
+        if (grow && s->level > 0 && s->part % 2 == 0) {
+            s->level--;
+            s->part /= 2;
+        }
+        if (whole) {
+            s->part = 0;
+            s->count++;
+            s->cut = false;
+            if (s->anew) {
+                s->start = s->interval_end;
+                s->count = 0;
+            }
+        }
+    } else if (t1 >= s->cut_end)
         s->cut = false;
 }
 

@@ -5,33 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-static void measure_gaps(const drape_model_seam *seam, const double *x, drape_seam_report *out)
-{
-    for (int32_t i = 0; i < seam->pair_count; i++) {
-        const int32_t *node = seam->pair + 2 * (size_t)i;
-        double d[3];
-        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
-        const double gap = vec3_norm(d);
-        out->gap_mean += gap / seam->pair_count;
-        out->gap_max = fmax(out->gap_max, gap);
-    }
-}
-
-/* g (node_count x 3): the force of the seam's term, with the sign of a gradient. */
-static void sum_forces(const drape_model_seam *seam, const double *g, drape_seam_report *out)
-{
-    for (int32_t i = 0; i < seam->pair_count; i++) {
-        const int32_t node = seam->pair[2 * (size_t)i];
-        const double *on = g + 3 * (size_t)node, size = vec3_norm(on);
-        vec3_add_scaled(-1, on, out->force);
-        out->tension += size;
-        if (i == 0 || size > out->tension_max) {
-            out->tension_max = size;
-            out->node = node;
-        }
-    }
-}
-
 int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out)
 {
     const int32_t count = sim ? sim->model->seam_count : 0;
@@ -48,7 +21,24 @@ int32_t drape_sim_seam(drape_sim *sim, int32_t index, drape_seam_report *out)
                                .node = -1};
     memset(sim->query_scratch, 0, 3 * (size_t)m->node_count * sizeof *sim->query_scratch);
     drape_system_term(sim->system, seam->term, &point, NULL, sim->query_scratch, NULL);
-    measure_gaps(seam, now->x, out);
-    sum_forces(seam, sim->query_scratch, out);
+    for (int32_t i = 0; i < seam->pair_count; i++) {
+        const int32_t *node = seam->pair + 2 * (size_t)i;
+        double d[3];
+        vec3_sub(now->x + 3 * (size_t)node[1], now->x + 3 * (size_t)node[0], d);
+        const double gap = vec3_norm(d);
+        out->gap_mean += gap / seam->pair_count;
+        out->gap_max = fmax(out->gap_max, gap);
+    }
+    /* the force of the seam's term, with the sign of a gradient */
+    for (int32_t i = 0; i < seam->pair_count; i++) {
+        const int32_t node = seam->pair[2 * (size_t)i];
+        const double *on = sim->query_scratch + 3 * (size_t)node, size = vec3_norm(on);
+        vec3_add_scaled(-1, on, out->force);
+        out->tension += size;
+        if (i == 0 || size > out->tension_max) {
+            out->tension_max = size;
+            out->node = node;
+        }
+    }
     return count;
 }

@@ -50,24 +50,6 @@ static void place_pinned(const drape_sim *sim, const double *given, double t, do
     }
 }
 
-/* Fixed nodes have no velocity, those with supports at rest none along what is held, nor have those at rest
- * where the host put them; pinned nodes and supports that move keep the given one until a step sets it to the
- * mean over their displacement. */
-static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
-{
-    const drape_model *m = sim->model;
-    const drape_motion *motion = drape_system_motion(sim->system);
-    for (int32_t i = 0; i < m->node_count; i++)
-        if (m->pinned[i])
-            memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
-    drape_supports_stop(motion, motion, drape_sim_state(sim)->v, state->v);
-    for (int32_t i = 0; i < motion->moved_count; i++) {
-        size_t at = 3 * (size_t)motion->moved_node[i];
-        if (!motion->pin_path[i].given)
-            memcpy(state->v + at, given + at, 3 * sizeof *state->v);
-    }
-}
-
 static drape_status check_pinned(const drape_sim *sim, const double *given, double t, const double *placed)
 {
     const drape_model *m = sim->model;
@@ -135,14 +117,6 @@ static drape_status check_images(const drape_sim *sim, const double *given)
     return DRAPE_OK;
 }
 
-/* The index of the first frame at or after the present time. */
-static int64_t first_frame(const drape_sim *sim)
-{
-    double t = drape_sim_state(sim)->t;
-    int64_t k = (int64_t)floor(t * sim->frame_rate);
-    return (double)k / sim->frame_rate < t ? k + 1 : k;
-}
-
 /* Makes the state a beginning: nothing that led to the previous state counts. */
 static void start_anew(drape_sim *sim, double t_before)
 {
@@ -154,8 +128,10 @@ static void start_anew(drape_sim *sim, double t_before)
         sim->rescue->leave(sim);
     drape_events_reset(sim);
     drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
-    if (t != t_before) /* otherwise the frame at t may have been emitted already */
-        sim->next_frame = first_frame(sim);
+    if (t != t_before) { /* the first frame at or after t; otherwise it may have been emitted already */
+        int64_t k = (int64_t)floor(t * sim->frame_rate);
+        sim->next_frame = (double)k / sim->frame_rate < t ? k + 1 : k;
+    }
     drape_sim_reset_energy(sim);
 }
 
@@ -184,7 +160,19 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     next->t = t;
     memcpy(next->x, placed, size);
     memcpy(next->v, v, size);
-    stop_fixed(sim, v, next);
+    /* Fixed nodes have no velocity, those with supports at rest none along what is held, nor have those at
+     * rest where the host put them; pinned nodes and supports that move keep the given one until a step
+     * sets it to the mean over their displacement. */
+    const drape_motion *motion = drape_system_motion(sim->system);
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->pinned[i])
+            memset(next->v + 3 * (size_t)i, 0, 3 * sizeof *next->v);
+    drape_supports_stop(motion, motion, drape_sim_state(sim)->v, next->v);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        size_t at = 3 * (size_t)motion->moved_node[i];
+        if (!motion->pin_path[i].given)
+            memcpy(next->v + at, v + at, 3 * sizeof *next->v);
+    }
     drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
     drape_state_commit(m, now, next);
     drape_state_relax(m, now, false, next); /* the account of energy starts anew */

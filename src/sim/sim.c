@@ -87,54 +87,10 @@ static drape_status create_system(drape_sim *sim, int threads)
     return DRAPE_OK;
 }
 
-static drape_status create_integrator(drape_sim *sim)
-{
-    const size_t before = sim->arena->bytes;
-    drape_status status = sim->chosen.integrator->create(sim->arena, sim->system,
-                                                         sim->chosen.integrator_values, &sim->integrator);
-    sim->integrator_bytes = sim->arena->bytes - before;
-    return status;
-}
-
-/* Pins that bodies carry have the velocity of the body at the start, which frames of the first step show.
- * Those with a track of their own begin at rest, and jump to its velocity. */
-static void start_pins(drape_sim *sim)
-{
-    const drape_motion *motion = drape_system_motion(sim->system);
-    drape_state *now = &sim->states[sim->now];
-    for (int32_t i = 0; i < motion->moved_count; i++)
-        if (drape_motion_carrier(motion, i) >= 0)
-            drape_motion_pin_velocity(motion, i, now->t, now->t, now->v + 3 * (size_t)motion->moved_node[i]);
-}
-
 static double tolerance_of(const drape_sim *sim)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     return integrator->tolerance ? integrator->tolerance(sim->integrator) : NAN;
-}
-
-static void note_tolerance(const drape_sim *sim)
-{
-    const double given = drape_chosen_integrator_value(&sim->chosen, "tolerance", NAN),
-                 used = tolerance_of(sim);
-    if (used < given)
-        drape_log(sim->ctx, DRAPE_LOG_INFO,
-                  "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used",
-                  given, used);
-}
-
-/* Rules of contact that move nodes return no share of an impact. */
-static void note_restitution(const drape_sim *sim)
-{
-    const drape_model *m = sim->model;
-    bool asked = m->contact.self && m->contact.self_restitution > 0;
-    for (int32_t c = 0; c < m->collider_count && !asked; c++)
-        asked = m->colliders[c].restitution > 0;
-    if (asked && sim->chosen.integrator->projects_contact)
-        drape_log(
-            sim->ctx, DRAPE_LOG_WARNING,
-            "\"%s\" ignores restitution: it resolves contact by moving nodes, and cloth does not rebound",
-            sim->chosen.integrator->entry.name);
 }
 
 static drape_stepping stepping_of(const drape_chosen *chosen)
@@ -175,12 +131,24 @@ static drape_status start_sim(drape_sim *sim, int threads)
     status = agree(sim, status);
     if (!status)
         status = create_system(sim, threads);
-    if (!status)
-        start_pins(sim);
+    if (!status) {
+        /* Pins that bodies carry have the velocity of the body at the start, which frames of the first
+         * step show. Those with a track of their own begin at rest, and jump to its velocity. */
+        const drape_motion *motion = drape_system_motion(sim->system);
+        drape_state *now = &sim->states[sim->now];
+        for (int32_t i = 0; i < motion->moved_count; i++)
+            if (drape_motion_carrier(motion, i) >= 0)
+                drape_motion_pin_velocity(motion, i, now->t, now->t,
+                                          now->v + 3 * (size_t)motion->moved_node[i]);
+    }
     status = status ? status : drape_check_cancel(sim->ctx);
     status = agree(sim, status);
-    if (!status)
-        status = create_integrator(sim);
+    if (!status) {
+        const size_t before = sim->arena->bytes;
+        status = sim->chosen.integrator->create(sim->arena, sim->system, sim->chosen.integrator_values,
+                                                &sim->integrator);
+        sim->integrator_bytes = sim->arena->bytes - before;
+    }
     status = status ? status : drape_check_cancel(sim->ctx);
     if (!status)
         status = drape_events_create(sim);
@@ -189,8 +157,22 @@ static drape_status start_sim(drape_sim *sim, int threads)
     status = agree(sim, status);
     if (status)
         return status;
-    note_tolerance(sim);
-    note_restitution(sim);
+    const double given = drape_chosen_integrator_value(&sim->chosen, "tolerance", NAN),
+                 used = tolerance_of(sim);
+    if (used < given)
+        drape_log(sim->ctx, DRAPE_LOG_INFO,
+                  "/integrator/tolerance: %.4g N is more than 1 %% of the load of a node: %.4g N is used",
+                  given, used);
+    /* Rules of contact that move nodes return no share of an impact. */
+    const drape_model *m = sim->model;
+    bool asked = m->contact.self && m->contact.self_restitution > 0;
+    for (int32_t c = 0; c < m->collider_count && !asked; c++)
+        asked = m->colliders[c].restitution > 0;
+    if (asked && sim->chosen.integrator->projects_contact)
+        drape_log(
+            sim->ctx, DRAPE_LOG_WARNING,
+            "\"%s\" ignores restitution: it resolves contact by moving nodes, and cloth does not rebound",
+            sim->chosen.integrator->entry.name);
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = sim->chosen.controller->max_attempts;

@@ -166,10 +166,16 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = drape_ranks_largest(drape_model_ranks(m), high);
 }
 
-/* Makes the new state the present one. The present one joins the past states that the controller wants; the
- * oldest of these is overwritten next. */
-static void rotate_states(drape_sim *sim)
+static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
+    drape_statistics *s = &sim->statistics;
+    if (!info->committed)
+        drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
+    /* what slides or flows leaves the elastic energy, and so stays in the balance */
+    sim->audit.dissipated += drape_state_relax(sim->model, drape_sim_state(sim),
+                                               sim->chosen.integrator->steady_state, next_state(sim));
+    /* Makes the new state the present one. The present one joins the past states that the controller
+     * wants; the oldest of these is overwritten next. */
     int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
     for (int k = 0; k < history_depth; k++) {
         int older = sim->past[k];
@@ -181,12 +187,13 @@ static void rotate_states(drape_sim *sim)
     sim->before = sim->now;
     sim->now = sim->next;
     sim->next = spare;
-}
-
-/* Lengths and energies are NaN if the integrator estimates none. */
-static void count_error(drape_sim *sim, const drape_step_info *info)
-{
-    drape_statistics *s = &sim->statistics;
+    drape_sim_add_work(sim, info);
+    measure_strain(sim, drape_sim_state(sim)->x);
+    s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
+    s->h_max = fmax(info->h, s->h_max);
+    s->steps_accepted++;
+    s->steps_unconverged += info->usable;
+    /* Lengths and energies are NaN if the integrator estimates none. */
     s->error_last = info->error;
     s->error_max = fmax(s->error_max, info->error);
     s->steps_above_error += info->error > drape_sim_error_bound(sim);
@@ -194,24 +201,6 @@ static void count_error(drape_sim *sim, const drape_step_info *info)
     sim->left.largest = fmax(sim->left.largest, info->left);
     sim->left.by_error += info->by_error;
     sim->left.above_own += !info->solved && info->left > info->own;
-}
-
-static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
-{
-    drape_statistics *s = &sim->statistics;
-    if (!info->committed)
-        drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
-    /* what slides or flows leaves the elastic energy, and so stays in the balance */
-    sim->audit.dissipated += drape_state_relax(sim->model, drape_sim_state(sim),
-                                               sim->chosen.integrator->steady_state, next_state(sim));
-    rotate_states(sim);
-    drape_sim_add_work(sim, info);
-    measure_strain(sim, drape_sim_state(sim)->x);
-    s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
-    s->h_max = fmax(info->h, s->h_max);
-    s->steps_accepted++;
-    s->steps_unconverged += info->usable;
-    count_error(sim, info);
     drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next, !info->laborious);
     if (sim->rescue)
         sim->rescue->accepted(sim);
@@ -338,17 +327,6 @@ static bool is_event(const drape_attempt *attempt)
     return attempt->reason == drape_reason_name(DRAPE_REASON_EVENT);
 }
 
-/* Logs what was rejected, and why. */
-static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
-{
-    char diagnostic[400];
-    if (attempt->accepted || is_event(attempt) || !sim->ctx->def.log)
-        return;
-    describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
-    drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
-              attempt->reason, drape_status_name(attempt->status), diagnostic);
-}
-
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", advice[200] = "";
@@ -470,7 +448,13 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     drape_system_end_step(sim->system);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
-    log_rejection(sim, attempt);
+    /* Logs what was rejected, and why. */
+    char diagnostic[400];
+    if (!attempt->accepted && !is_event(attempt) && sim->ctx->def.log) {
+        describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
+        drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
+                  attempt->reason, drape_status_name(attempt->status), diagnostic);
+    }
     drape_status notified = notify_attempt(sim, attempt);
     drape_status reported = drape_events_report(sim);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;

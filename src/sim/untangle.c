@@ -89,11 +89,6 @@ static drape_status find(const drape_sim *sim, const double *x, finding *found)
     return status;
 }
 
-static bool is_clear(const finding *found, const drape_untangle_outcome *outcome)
-{
-    return found->pairs == 0 && found->inside == 0 && drape_untangle_is_clear(outcome);
-}
-
 /* ---- The report ---- */
 
 static void report_moves(drape_sim *sim, const double *x, drape_untangling *u)
@@ -207,7 +202,8 @@ static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drap
         after = before;
         outcome.min_share = outcome.min_share_before;
     }
-    *u = (drape_untangling){.clear = is_clear(&after, &outcome),
+    *u = (drape_untangling){.clear =
+                                after.pairs == 0 && after.inside == 0 && drape_untangle_is_clear(&outcome),
                             .time = drape_sim_time(sim),
                             .sweeps = outcome.sweeps,
                             .pairs_before = before.pairs,
@@ -270,15 +266,6 @@ drape_status drape_sim_untangle_some(drape_sim *sim, int sweeps)
     return status;
 }
 
-static void log_untangling(const drape_sim *sim, const drape_untangling *u)
-{
-    drape_log(sim->ctx, u->clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
-              "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
-              "in colliders; the largest displacement of a node is %.4g m",
-              u->time, u->clear ? "untangled" : "did not come apart", u->sweeps, (long long)u->pairs_before,
-              (long long)u->pairs, (int)u->inside_before, (int)u->inside, u->displacement);
-}
-
 drape_status drape_sim_untangle_start(drape_sim *sim)
 {
     drape_untangle_def def;
@@ -289,7 +276,11 @@ drape_status drape_sim_untangle_start(drape_sim *sim)
     if (!status)
         status = untangle(sim, &def, &u);
     if (!status || status == DRAPE_E_SOLVER)
-        log_untangling(sim, &u);
+        drape_log(sim->ctx, u.clear ? DRAPE_LOG_INFO : DRAPE_LOG_WARNING,
+                  "t=%.9g: %s in %d sweeps: %lld to %lld pairs of an edge and a triangle, %d to %d triangles "
+                  "in colliders; the largest displacement of a node is %.4g m",
+                  u.time, u.clear ? "untangled" : "did not come apart", u.sweeps, (long long)u.pairs_before,
+                  (long long)u.pairs, (int)u.inside_before, (int)u.inside, u.displacement);
     if (status == DRAPE_E_SOLVER && def.keep) {
         sim->ctx->message[0] = 0; /* the run goes on, with a warning */
         status = DRAPE_OK;

@@ -76,14 +76,6 @@ static bool takes_clamps(const drape_model *m, int32_t cloth)
     return takes;
 }
 
-static bool clamps_edges(const drape_cloth *cloth)
-{
-    bool clamps = false;
-    for (int32_t e = 0; cloth->edge_clamped && e < cloth->mesh.edge_count; e++)
-        clamps = clamps || cloth->edge_clamped[e];
-    return clamps;
-}
-
 /* Clamps that keep no direction. */
 static bool has_unused_clamp(drape_sim *sim, char *text, size_t size)
 {
@@ -92,7 +84,10 @@ static bool has_unused_clamp(drape_sim *sim, char *text, size_t size)
         const drape_pin *pin = &m->pins[p];
         const drape_cloth *cloth = &m->cloths[pin->cloth];
         const bool read = takes_clamps(m, pin->cloth);
-        if (!pin->clamps || (read && clamps_edges(cloth)))
+        bool clamps = false;
+        for (int32_t e = 0; cloth->edge_clamped && e < cloth->mesh.edge_count; e++)
+            clamps = clamps || cloth->edge_clamped[e];
+        if (!pin->clamps || (read && clamps))
             continue;
         snprintf(text, size,
                  read ? "the pins \"%.60s\" of %s clamp no edge: both nodes of an edge must be pinned"
