@@ -25,15 +25,6 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
 };
 
-static double stable_step(const drape_trial *trial, const drape_state *at)
-{
-    drape_stability found;
-    if (!trial->integrator || !trial->integrator->stability)
-        return INFINITY;
-    trial->integrator->stability(trial->integrator_state, at, trial->h, &found);
-    return found.step;
-}
-
 /* Returns the largest stable step: at the end of the attempt if that state is known, otherwise at its
  * start. */
 static double limit_of(drape_trial *trial)
@@ -44,7 +35,13 @@ static double limit_of(drape_trial *trial)
         --*left;
         return *limit;
     }
-    *limit = stable_step(trial, failed ? trial->in : trial->out);
+    *limit = INFINITY;
+    if (trial->integrator && trial->integrator->stability) {
+        drape_stability found;
+        trial->integrator->stability(trial->integrator_state, failed ? trial->in : trial->out, trial->h,
+                                     &found);
+        *limit = found.step;
+    }
     *left = failed ? 0 : EVERY - 1;
     return *limit;
 }

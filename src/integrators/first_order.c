@@ -268,17 +268,6 @@ static void diagnose(drape_first_order *s, drape_step_info *info)
     info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "local error / tolerance", 1);
 }
 
-/* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
-static drape_status check_step_size(drape_first_order *s, double h, bool last, drape_step_info *info)
-{
-    if (drape_step_moves(h, s->size, s->speed, last, &s->tiny))
-        return DRAPE_OK;
-    info->h = h;
-    s->crossing = s->crossed;
-    info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
-    return DRAPE_E_STEP_TOO_SMALL;
-}
-
 /* Restarts with a first step of at most h, or of a size that the solver chooses, for 0. Consistent initial
  * values need no solve: x' = v, v' = -M^-1 g. */
 static drape_status start(drape_first_order *s, const drape_state *in, double h, drape_step_info *info)
@@ -402,8 +391,13 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     drape_status status = prepare(s, in, end, h, &t, info);
     if (!status && s->n > 0)
         status = solve(s, end, h, &t, info);
-    if (!status)
-        status = check_step_size(s, t - in->t, t == s->span[1] || t == end, info);
+    /* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
+    if (!status && !drape_step_moves(t - in->t, s->size, s->speed, t == s->span[1] || t == end, &s->tiny)) {
+        info->h = t - in->t;
+        s->crossing = s->crossed;
+        info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        status = DRAPE_E_STEP_TOO_SMALL;
+    }
     if (end - t <= LANDED * fabs(end))
         t = end;
     s->reached = NAN;

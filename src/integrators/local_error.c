@@ -62,13 +62,6 @@ static double rate_of_motion(const drape_local_error *c, const drape_state *in, 
     return sqrt(sum / (6.0 * fmax(1, m->free_count)));
 }
 
-static double first_step(const drape_local_error *c, const drape_state *in, const double *g)
-{
-    const double rate = fmax(rate_of_motion(c, in, g), c->speed / c->size),
-                 relative = fmin(1, fmin(c->atol_x / c->size, c->atol_v / c->speed));
-    return START_SHARE / rate * drape_pow(relative, 1 / c->power);
-}
-
 drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in, const double *g,
                                      drape_local_attempt *a, drape_step_info *info)
 {
@@ -81,8 +74,12 @@ drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in
     c->made.end = NAN;
     a->again = c->tried == in->t;
     c->tried = in->t;
-    if (isnan(c->past.end))
-        c->past = (drape_step_record){.end = in->t, .proposed = first_step(c, in, g)};
+    if (isnan(c->past.end)) {
+        const double rate = fmax(rate_of_motion(c, in, g), c->speed / c->size),
+                     relative = fmin(1, fmin(c->atol_x / c->size, c->atol_v / c->speed));
+        c->past = (drape_step_record){.end = in->t,
+                                      .proposed = START_SHARE / rate * drape_pow(relative, 1 / c->power)};
+    }
     const double wanted = fmin(fmin(c->past.proposed, c->max_step), a->bound);
     a->h = wanted >= LANDED * left ? left : 2 * wanted > left ? left / 2 : wanted;
     a->cut = a->h < LANDED * fmin(c->past.proposed, c->max_step);

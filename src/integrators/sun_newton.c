@@ -72,15 +72,6 @@ static int renew(drape_sun_newton *newton, N_Vector correction, void *library)
     return code ? code : correct(newton, correction, library);
 }
 
-/* What makes x' - v, or v' + M^-1 g, of a residual. */
-static double scale_of(const drape_sun_newton *newton, void *library)
-{
-    sunrealtype gamma = 1;
-    if (newton->gamma)
-        newton->gamma(library, &gamma);
-    return 1 / gamma;
-}
-
 /* Begins at the predicted x, with v = x': then every correction has dv = c_j dx, and the residual of
  * M v' + g alone decides how long it should be. */
 static int begin(drape_sun_newton *newton, N_Vector y, void *library)
@@ -90,7 +81,11 @@ static int begin(drape_sun_newton *newton, N_Vector y, void *library)
     if (code)
         return code;
     const int64_t n = newton->n / 2;
-    const double *f = N_VGetArrayPointer(newton->residual), scale = scale_of(newton, library);
+    sunrealtype gamma = 1;
+    if (newton->gamma)
+        newton->gamma(library, &gamma);
+    /* scale: what makes x' - v, or v' + M^-1 g, of a residual */
+    const double *f = N_VGetArrayPointer(newton->residual), scale = 1 / gamma;
     double *v = N_VGetArrayPointer(y) + n;
     for (int64_t i = 0; i < n; i++)
         v[i] = scale * f[i];

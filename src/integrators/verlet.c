@@ -382,15 +382,6 @@ static void stability(void *state, const drape_state *at, double h, drape_stabil
     out->step = s->values[PARAM_SUBSTEPS] > 0 ? s->values[PARAM_SUBSTEPS] * out->limit : INFINITY;
 }
 
-/* The number of substeps of this step; more than MAX_SUBSTEPS: the step is rejected. */
-static int64_t count_substeps(verlet_state *s, const drape_state *in, double h)
-{
-    drape_stability known = {.limit = INFINITY};
-    if (s->values[PARAM_SUBSTEPS] == 0)
-        stability(s, in, h, &known);
-    return substeps_for(s, h, known.limit);
-}
-
 /* ---- The step ---- */
 
 /* The first node that is not finite, or else the fastest. */
@@ -433,7 +424,10 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 {
     verlet_state *s = state;
     size_t nodes = 3 * (size_t)s->model->node_count;
-    int64_t n = count_substeps(s, in, h);
+    drape_stability known = {.limit = INFINITY};
+    if (s->values[PARAM_SUBSTEPS] == 0)
+        stability(s, in, h, &known);
+    const int64_t n = substeps_for(s, h, known.limit);
     info->residual = info->tolerance = NAN;
     info->lenient = s->values[PARAM_GUARD] == 0;
     if (s->values[PARAM_SUBSTEPS] == 0 && n > MAX_SUBSTEPS) {

@@ -42,15 +42,6 @@ struct drape_factored_jacobian {
 
 /* ---- Where it is better ---- */
 
-/* Drag that couples nodes is not symmetric, and large beside the inertia of light cloth. */
-static bool has_coupled_drag(const drape_model *m)
-{
-    for (int32_t t = 0; t < m->term_count; t++)
-        if (m->terms[t].ops->in_medium && m->terms[t].ops->nodes > 1)
-            return true;
-    return false;
-}
-
 /* The mean square speed of waves along the pairs of a term at rest, l^2 k/m [m2/s2]. */
 static double mean_square_speed(const drape_system *system, int32_t term, const double *h)
 {
@@ -97,9 +88,13 @@ drape_status drape_factored_jacobian_is_better(drape_system *system, double dt, 
         status = drape_scalar_stiffness_covers(system, flat);
     if (!status)
         status = wave_speed(system, &scratch, &speed);
-    *needed = m->free_count <= FEW_NODES || has_coupled_drag(m);
-    for (int32_t t = 0; !status && t < m->term_count; t++)
-        *needed |= m->terms[t].ops->measure && !m->terms[t].ops->pair && !flat[t];
+    *needed = m->free_count <= FEW_NODES;
+    for (int32_t t = 0; !status && t < m->term_count; t++) {
+        const drape_term_ops *ops = m->terms[t].ops;
+        *needed |= ops->measure && !ops->pair && !flat[t];
+        /* drag that couples nodes is not symmetric, and large beside the inertia of light cloth */
+        *needed |= ops->in_medium && ops->nodes > 1;
+    }
     *better = *needed || speed * dt > MAX_TRAVEL * m->length;
     drape_arena_free(&scratch);
     return status;

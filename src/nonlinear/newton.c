@@ -665,19 +665,6 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
 
 /* ---- Creation and destruction ---- */
 
-static bool configure(drape_newton *s)
-{
-    const double length = s->equation->model->length;
-    DRAPE_KINSOL_QUIET(s->kin);
-    return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
-           !KINSetLinearSolver(s->kin, s->shell.solver, s->shell.matrix) && !KINSetJacFn(s->kin, jacobian) &&
-           !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
-           !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * length) &&
-           !KINSetMaxNewtonStep(s->kin, DBL_MAX) && /* by default the size of the guess bounds corrections */
-           !KINSetMaxSetupCalls(s->kin, SETUPS) && !KINSetNoResMon(s->kin, SUNTRUE) &&
-           !KINSetMaxBetaFails(s->kin, LONG_MAX); /* of KINSOL's curvature condition: no limit */
-}
-
 /* Making a vector of ranks is collective, and copying it is not. */
 static drape_status create_vectors(drape_arena *arena, drape_newton *s)
 {
@@ -710,10 +697,19 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);
     if (status)
         return status;
-    return configure(s) ? DRAPE_OK
-                        : drape_fail(arena->ctx, DRAPE_E_MEMORY,
-                                     "out of memory: KINSOL cannot be set up for %lld unknowns",
-                                     (long long)s->equation->dofs);
+    DRAPE_KINSOL_QUIET(s->kin);
+    const bool set =
+        !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
+        !KINSetLinearSolver(s->kin, s->shell.solver, s->shell.matrix) && !KINSetJacFn(s->kin, jacobian) &&
+        !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
+        !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * s->equation->model->length) &&
+        !KINSetMaxNewtonStep(s->kin, DBL_MAX) && /* by default the size of the guess bounds corrections */
+        !KINSetMaxSetupCalls(s->kin, SETUPS) && !KINSetNoResMon(s->kin, SUNTRUE) &&
+        !KINSetMaxBetaFails(s->kin, LONG_MAX); /* of KINSOL's curvature condition: no limit */
+    return set ? DRAPE_OK
+               : drape_fail(arena->ctx, DRAPE_E_MEMORY,
+                            "out of memory: KINSOL cannot be set up for %lld unknowns",
+                            (long long)s->equation->dofs);
 }
 
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,

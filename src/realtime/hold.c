@@ -15,13 +15,6 @@
 #define MOST_IN_A_ROW  10
 #define MOST_IN_A_STEP 24
 
-/* A nominal step, or what is left of the advance. */
-static double end_of_hold(const drape_sim *sim)
-{
-    const drape_schedule *s = &sim->schedule;
-    return fmin(s->now + sim->realtime->dt, s->cut ? s->cut_end : s->end);
-}
-
 /* Free nodes go where the pins of their cloth go as one: otherwise these would be torn from them, and pass
  * through the cloth beside them. */
 static void carry(const drape_motion *motion, const drape_state *now, drape_state *next)
@@ -56,7 +49,9 @@ static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info
     const drape_state *now = drape_sim_state(sim);
     const drape_model *m = sim->model;
     const size_t n = 3 * (size_t)m->node_count;
-    const double t1 = end_of_hold(sim), h = t1 - now->t;
+    const drape_schedule *s = &sim->schedule;
+    /* a nominal step, or what is left of the advance */
+    const double t1 = fmin(s->now + sim->realtime->dt, s->cut ? s->cut_end : s->end), h = t1 - now->t;
     if (!(h > 0))
         return DRAPE_RETRY_REJECTED;
     *info = (drape_step_info){.reason = drape_reason_name(DRAPE_REASON_HELD),

@@ -108,13 +108,6 @@ static plan plan_stretched(drape_sim *sim, double owed, double frame, double bud
     return (plan){.effort = effort, .steps = steps, .h = fmin(owed / (double)steps, longest)};
 }
 
-static plan make_plan(drape_sim *sim, double owed, double frame, double budget)
-{
-    plan p;
-    sim->realtime->meets = false;
-    return plan_effort(sim, owed, budget, &p) ? p : plan_stretched(sim, owed, frame, budget);
-}
-
 /* ---- A call ---- */
 
 /* Further iterations in a step leave enough of the budget for its end, and for the least work of the steps
@@ -277,13 +270,6 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
     report_present(sim, report);
 }
 
-static const char *level_name(const drape_sim *sim)
-{
-    if (sim->realtime->stretched)
-        return "larger steps";
-    return sim->realtime->effort > 0 ? "fewer iterations" : "full";
-}
-
 static drape_status check_arguments(drape_sim *sim, double frame_dt, double budget)
 {
     if (!(frame_dt > 0 && frame_dt <= 1e6))
@@ -336,7 +322,10 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
     if (!status) {
         const double goal = drape_sim_state(sim)->t + owed;
         sim->realtime->unchecked = false;
-        const plan p = make_plan(sim, owed, frame_dt, budget);
+        sim->realtime->meets = false;
+        plan p;
+        if (!plan_effort(sim, owed, budget, &p))
+            p = plan_stretched(sim, owed, frame_dt, budget);
         drape_realtime_set_effort(sim, p.effort);
         if (p.steps > 0) {
             /* Sets the end of the call and, if the sim counts steps, their size h; integrators and
@@ -348,7 +337,9 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
             status = take_steps(sim, &p, start, budget, &report);
         }
         settle(sim, goal, &rates, &report);
-        report.level = level_name(sim);
+        report.level = sim->realtime->stretched    ? "larger steps"
+                       : sim->realtime->effort > 0 ? "fewer iterations"
+                                                   : "full";
         report.effort = sim->realtime->effort;
         report.relaxed = drape_sim_relaxed_now(sim, &report.deepest_relaxed);
         report.seconds = drape_clock_seconds() - start;

@@ -344,23 +344,18 @@ static drape_status relax_blockers_of(drape_contact *c, drape_relax_extent exten
     return status;
 }
 
-/* Bodies that are let in come out again. Cloth that passes through pinned cloth stays on its other side, so
- * it is relaxed last. */
-static drape_status relax_blockers(drape_contact *c, drape_relax_extent extent, int32_t *added)
-{
-    drape_status status = go_to(c, c->start, c->start_t);
-    if (!status)
-        status = relax_blockers_of(c, extent, true, added);
-    if (!status && *added == 0 && extent == DRAPE_RELAX_NEAR)
-        status = relax_blockers_of(c, extent, false, added);
-    return status;
-}
-
 static drape_status relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
     drape_status status = look_ahead(c, c->start, c->start_t, t1, true, added);
-    if (!status && *added == 0 && extent != DRAPE_RELAX_NONE)
-        status = relax_blockers(c, extent, added);
+    if (!status && *added == 0 && extent != DRAPE_RELAX_NONE) {
+        /* Bodies that are let in come out again. Cloth that passes through pinned cloth stays on its other
+         * side, so it is relaxed last. */
+        status = go_to(c, c->start, c->start_t);
+        if (!status)
+            status = relax_blockers_of(c, extent, true, added);
+        if (!status && *added == 0 && extent == DRAPE_RELAX_NEAR)
+            status = relax_blockers_of(c, extent, false, added);
+    }
     c->listed = false;
     return status;
 }
@@ -467,15 +462,6 @@ static bool is_out(void *user, const drape_relaxed_node *node)
            !is_pierced(c, node);
 }
 
-/* With this factor the pressure is that of the pairs which are held, at the margin and with the scene's
- * stiffness. With that of the present, which bodies that close upon cloth have raised, by up to ten thousand,
- * the pressure would tear at cloth that hangs over the edge of a body, long after they have parted. */
-static double max_factor(const drape_contact *c)
-{
-    const drape_contact_def *def = &c->model->contact;
-    return -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure;
-}
-
 /* Measures the relaxed nodes at the present point, which is listed, and holds those again that came out.
  * *changed: some were. */
 static drape_status review(drape_contact *c, double t, bool *changed)
@@ -484,7 +470,12 @@ static drape_status review(drape_contact *c, double t, bool *changed)
     drape_contact_fit_bodies(c, c->pose);
     measure(c);
     const double before = relaxed->t;
-    drape_relaxed_update(relaxed, t, max_factor(c));
+    /* With this factor the pressure is that of the pairs which are held, at the margin and with the scene's
+     * stiffness. With that of the present, which bodies that close upon cloth have raised, by up to ten
+     * thousand, the pressure would tear at cloth that hangs over the edge of a body, long after they have
+     * parted. */
+    const drape_contact_def *def = &c->model->contact;
+    drape_relaxed_update(relaxed, t, -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure);
     *changed = relaxed->t != before;
     if (relaxed->exempt.count > 0)
         drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL, NULL); /* for is_pierced */

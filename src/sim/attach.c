@@ -136,14 +136,6 @@ static bool same_triangles(const drape_collider *a, const drape_collider *b)
            memcmp(a->shape.triangle, b->shape.triangle, 3 * (size_t)count * sizeof *a->shape.triangle) == 0;
 }
 
-static int32_t number_in(const drape_model *to, int32_t collider, const int32_t *before)
-{
-    for (int32_t c = 0; c < to->collider_count; c++)
-        if (before[c] == collider)
-            return c;
-    return -1;
-}
-
 /* Pins of `to` that its colliders are to carry on triangles that are not known yet. */
 typedef struct joining {
     int32_t *collider; /* (node_count) -1: none */
@@ -157,10 +149,13 @@ static void continue_rides(drape_sim *to, const drape_sim *from, const int32_t *
     const drape_model *m = to->model;
     const drape_motion *motion = drape_system_motion(from->system);
     for (int32_t i = 0; i < motion->moved_count; i++) {
-        const int32_t node = motion->moved_node[i], on = drape_motion_carrier(motion, i),
-                      c = on < 0 ? -1 : number_in(m, on, before);
+        const int32_t node = motion->moved_node[i], on = drape_motion_carrier(motion, i);
         drape_ride ride = motion->ride[i];
-        if (c < 0 || !m->pinned[node] || !(ride.given || (m->ride && m->ride[node].collider == c)))
+        int32_t c = 0;
+        while (c < m->collider_count && before[c] != on)
+            c++;
+        if (on < 0 || c == m->collider_count || !m->pinned[node] ||
+            !(ride.given || (m->ride && m->ride[node].collider == c)))
             continue;
         ride.collider = c;
         if (same_triangles(&m->colliders[c], &from->model->colliders[on])) {

@@ -95,20 +95,6 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
         drape_archive_double(a, parts[i]);
 }
 
-/* A counted reason is static text; a reason that was read is stored in the sim's arena. */
-static void archive_reason(drape_sim *sim, drape_reason_total *reason, drape_archive *a)
-{
-    char text[DRAPE_ARCHIVE_TEXT];
-    snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);
-    drape_archive_text(a, text, sizeof text);
-    drape_archive_int64(a, &reason->count);
-    if (!a->reading)
-        return;
-    reason->reason = drape_arena_text(sim->arena, text);
-    if (!reason->reason)
-        drape_archive_note(a, DRAPE_E_MEMORY);
-}
-
 /* Whether the next frame lies within the last step. A steady-state integrator has only the first frame. */
 static bool is_next_frame(const drape_sim *sim)
 {
@@ -137,7 +123,15 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     if (drape_archive_good(a) && !is_place(count, 0, DRAPE_MAX_REASONS + 1))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d reasons for rejections", count);
     for (int i = 0; i < count && drape_archive_good(a); i++) {
-        archive_reason(sim, &sim->reasons[i], a);
+        drape_reason_total *reason = &sim->reasons[i];
+        char text[DRAPE_ARCHIVE_TEXT];
+        snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);
+        drape_archive_text(a, text, sizeof text);
+        drape_archive_int64(a, &reason->count);
+        /* a counted reason is static text; one that was read is stored in the sim's arena */
+        reason->reason = a->reading ? drape_arena_text(sim->arena, text) : reason->reason;
+        if (!reason->reason)
+            drape_archive_note(a, DRAPE_E_MEMORY);
         sim->reason_count = drape_archive_good(a) ? i + 1 : i;
     }
     if (drape_archive_has_read(a) && !is_next_frame(sim))
@@ -167,35 +161,25 @@ static void archive_untangling(drape_sim *sim, drape_archive *a)
                            (int)sim->model->node_count);
 }
 
-/* Read by create_restored. */
-static void write_own(drape_sim *sim, drape_archive *a)
+void drape_sim_archive(drape_sim *sim, drape_archive *a)
 {
-    const size_t nodes = (size_t)sim->model->node_count;
-    bool pins = sim->pinned != NULL, masses = sim->masses != NULL;
-    drape_archive_bool(a, &pins);
-    drape_archive_bool(a, &masses);
-    if (pins)
-        drape_archive_bytes(a, sim->pinned, nodes);
-    if (masses)
-        drape_archive_doubles(a, sim->masses, nodes);
-}
-
-/* Of a run on several ranks, integrators are restarted, and what they have done is that of earlier ones. */
-static void archive_work(drape_sim *sim, drape_archive *a)
-{
+    if (!a->reading) { /* read by create_restored */
+        const size_t nodes = (size_t)sim->model->node_count;
+        bool pins = sim->pinned != NULL, masses = sim->masses != NULL;
+        drape_archive_bool(a, &pins);
+        drape_archive_bool(a, &masses);
+        if (pins)
+            drape_archive_bytes(a, sim->pinned, nodes);
+        if (masses)
+            drape_archive_doubles(a, sim->masses, nodes);
+    }
+    /* Of a run on several ranks, integrators are restarted, and what they have done is that of earlier ones. */
     drape_work work = sim->earlier;
     if (a->by_ranks && !a->reading)
         work = drape_work_sum(sim->chosen.integrator->work(sim->integrator), &work);
     drape_work_archive(&work, a);
     if (drape_archive_has_read(a))
         sim->earlier = work;
-}
-
-void drape_sim_archive(drape_sim *sim, drape_archive *a)
-{
-    if (!a->reading)
-        write_own(sim, a);
-    archive_work(sim, a);
     archive_states(sim, a);
     drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
     archive_schedule(&sim->schedule, a);

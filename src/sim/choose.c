@@ -24,26 +24,6 @@ static const struct {
                 {&drape_integrator_registry, "generalized_alpha", "bdf2"},
                 {&drape_controller_registry, "iterations", "halving"}};
 
-static bool is_listed(const char *const *names, size_t count, const char *name)
-{
-    for (size_t i = 0; i < count; i++)
-        if (strcmp(names[i], name) == 0)
-            return true;
-    return false;
-}
-
-static drape_status unknown_key(drape_context *ctx, const choice *c, const char *at, const char *name)
-{
-    const char *keys[MAX_KEYS];
-    const drape_entry *entry;
-    size_t count = 0;
-    for (int i = 0; (entry = c->registry->entries[i]) != NULL; i++)
-        for (int p = 0; p < entry->param_count && count < MAX_KEYS; p++)
-            if (!is_listed(keys, count, entry->params[p].name))
-                keys[count++] = entry->params[p].name;
-    return drape_param_unknown(ctx, at, name, keys, count);
-}
-
 /* Checks a setting against every entry that has a parameter of its name; stores the value if the chosen
  * entry has one. */
 static drape_status apply(drape_context *ctx, const choice *c, int chosen, const drape_setting *setting,
@@ -66,9 +46,19 @@ static drape_status apply(drape_context *ctx, const choice *c, int chosen, const
             memcpy(values + drape_param_place(entry->params, p), value,
                    (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
     }
-    if (!known && !drape_retired(c->quiet ? NULL : ctx, at, c->registry->noun, setting->name))
-        return unknown_key(ctx, c, at, setting->name);
-    return DRAPE_OK;
+    if (known || drape_retired(c->quiet ? NULL : ctx, at, c->registry->noun, setting->name))
+        return DRAPE_OK;
+    const char *keys[MAX_KEYS]; /* of all entries, each once */
+    size_t count = 0;
+    for (int i = 0; (entry = c->registry->entries[i]) != NULL; i++)
+        for (int p = 0; p < entry->param_count && count < MAX_KEYS; p++) {
+            size_t k = 0;
+            while (k < count && strcmp(keys[k], entry->params[p].name) != 0)
+                k++;
+            keys[k] = entry->params[p].name;
+            count += k == count;
+        }
+    return drape_param_unknown(ctx, at, setting->name, keys, count);
 }
 
 static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, const drape_setting *settings,

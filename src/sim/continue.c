@@ -73,12 +73,6 @@ static drape_status refuse_pin(const drape_sim *sim, int32_t node, const double 
                       drape_sim_state(sim)->t);
 }
 
-static bool has_track(const drape_motion *motion, int32_t i)
-{
-    const int32_t track = motion->moved_track[i];
-    return track >= 0 && drape_track_moves(&motion->model->tracks[track]);
-}
-
 /* Pinned nodes are where they were, carried on from there by their collider, or held there unless their
  * motion leads there anyway. A node that was pinned before may not get a track that begins elsewhere. */
 static drape_status hold(drape_sim *to, const drape_sim *from)
@@ -97,9 +91,10 @@ static drape_status hold(drape_sim *to, const drape_sim *from)
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
         if (drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= DRAPE_SAME * m->length)
             continue;
+        const int32_t place = motion->place[i], track = place >= 0 ? motion->moved_track[place] : -1;
         if (drape_sim_carrier(to, i) >= 0)
             drape_sim_ride_on(to, i);
-        else if (from->model->pinned[i] && motion->place[i] >= 0 && has_track(motion, motion->place[i]))
+        else if (from->model->pinned[i] && track >= 0 && drape_track_moves(&m->tracks[track]))
             status = refuse_pin(to, i, x, pin);
         else
             drape_motion_hold_pin(motion, i, x);

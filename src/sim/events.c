@@ -39,16 +39,11 @@ typedef struct moment {
     drape_status status;
 } moment;
 
-static moment at_end(drape_sim *sim, const drape_state *next, const drape_state *end)
-{
-    return (moment){.sim = sim, .next = next, .t = end->t, .x = end->x, .v = end->v};
-}
-
 static moment between(drape_sim *sim, const drape_state *next, double t)
 {
-    const drape_state *now = drape_sim_state(sim);
+    const drape_state *now = drape_sim_state(sim), *end = t <= now->t ? now : next;
     if (t <= now->t || t >= next->t)
-        return at_end(sim, next, t <= now->t ? now : next);
+        return (moment){.sim = sim, .next = next, .t = end->t, .x = end->x, .v = end->v};
     drape_sim_dense_positions(sim, now, next, t, sim->frame);
     drape_sim_dense_velocities(sim, now, next, t, sim->frame_velocity);
     return (moment){.sim = sim, .next = next, .t = t, .x = sim->frame, .v = sim->frame_velocity};
@@ -286,14 +281,6 @@ static drape_status search_all(drape_sim *sim, const drape_state *next)
 
 /* ---- The step that ends at a root ---- */
 
-static const drape_pending_root *first_that_acts(const drape_event_set *e)
-{
-    for (int32_t i = 0; i < e->pending_count; i++)
-        if (acts(&e->watches[e->pending[i].event]))
-            return &e->pending[i];
-    return NULL;
-}
-
 /* f changes by this much in the tolerance at the end of the step. */
 static double change_in_tolerance(const drape_watch *w, double h, double t)
 {
@@ -438,27 +425,22 @@ static drape_event_verdict extend(drape_sim *sim, const drape_state *next)
     return DRAPE_EVENTS_PASS;
 }
 
-static bool has_active(const drape_event_set *e)
-{
-    bool active = false;
-    for (int32_t i = 0; i < e->count && !active; i++)
-        active = !is_over(&e->watches[i]);
-    return active;
-}
-
 drape_event_verdict drape_events_examine(drape_sim *sim, const drape_state *next, drape_status *status)
 {
     drape_event_set *e = &sim->events;
-    if (!has_active(e) || sim->chosen.integrator->steady_state)
+    bool active = false;
+    for (int32_t i = 0; i < e->count && !active; i++)
+        active = !is_over(&e->watches[i]);
+    if (!active || sim->chosen.integrator->steady_state)
         return DRAPE_EVENTS_PASS;
     *status = search_all(sim, next);
     if (*status) {
         e->pending_count = 0;
         return DRAPE_EVENTS_FAIL;
     }
-    const drape_pending_root *root = first_that_acts(e);
-    if (root)
-        return aim_at(sim, next, root);
+    for (int32_t i = 0; i < e->pending_count; i++)
+        if (acts(&e->watches[e->pending[i].event]))
+            return aim_at(sim, next, &e->pending[i]);
     return e->search.event >= 0 && next->t == e->search.target ? extend(sim, next) : DRAPE_EVENTS_PASS;
 }
 

@@ -72,15 +72,6 @@ static uint64_t add_track(uint64_t hash, const drape_track *track)
     return hash;
 }
 
-static uint64_t add_history(uint64_t hash, const drape_history *history)
-{
-    const size_t count = history->key_count;
-    hash = add_integer(hash, (int64_t)count);
-    hash = add_doubles(hash, history->time, count);
-    hash = add_doubles(hash, history->value, count);
-    return add_doubles(hash, history->slope, history->slope ? count : 0);
-}
-
 static uint64_t add_term(uint64_t hash, const drape_term *term)
 {
     const drape_elements *el = &term->elements;
@@ -107,8 +98,14 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
         hash = add(hash, p->part, links * sizeof *p->part);
         hash = add_doubles(hash, p->weight, links);
     }
-    if (term->history)
-        hash = add_history(hash, term->history);
+    if (term->history) {
+        const drape_history *history = term->history;
+        const size_t keys = history->key_count;
+        hash = add_integer(hash, (int64_t)keys);
+        hash = add_doubles(hash, history->time, keys);
+        hash = add_doubles(hash, history->value, keys);
+        hash = add_doubles(hash, history->slope, history->slope ? keys : 0);
+    }
     return add_doubles(hash, term->damping, term->damping ? count : 0);
 }
 
@@ -183,15 +180,6 @@ static uint64_t add_nodes(uint64_t hash, const drape_model *m)
     return hash;
 }
 
-static uint64_t add_event(uint64_t hash, const drape_model_event *event)
-{
-    const int64_t sizes[] = {event->cloth, event->pinned_count, event->direction, event->action, event->once};
-    hash = add_text(hash, event->ops->entry.name);
-    hash = add(hash, sizes, sizeof sizes);
-    hash = add(hash, event->pinned, (size_t)event->pinned_count * sizeof *event->pinned);
-    return add_doubles(hash, event->values, DRAPE_MAX_PARAMS);
-}
-
 uint64_t drape_model_identity(const drape_model *m)
 {
     if (m->part)
@@ -208,8 +196,15 @@ uint64_t drape_model_identity(const drape_model *m)
         hash = add(hash, m->sewn, (size_t)m->node_count * sizeof *m->sewn);
     for (int32_t i = 0; i < m->collider_count; i++)
         hash = add_collider(hash, &m->colliders[i]);
-    for (int32_t i = 0; i < m->event_count; i++)
-        hash = add_event(hash, &m->events[i]);
+    for (int32_t i = 0; i < m->event_count; i++) {
+        const drape_model_event *event = &m->events[i];
+        const int64_t numbers[] = {event->cloth, event->pinned_count, event->direction, event->action,
+                                   event->once};
+        hash = add_text(hash, event->ops->entry.name);
+        hash = add(hash, numbers, sizeof numbers);
+        hash = add(hash, event->pinned, (size_t)event->pinned_count * sizeof *event->pinned);
+        hash = add_doubles(hash, event->values, DRAPE_MAX_PARAMS);
+    }
     if (m->ignored)
         hash = add(hash, m->ignored, (size_t)(m->collider_count + m->cloth_count) * (size_t)m->cloth_count);
     const double values[] = {m->untangle.given, m->untangle.goes_on};

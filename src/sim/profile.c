@@ -244,12 +244,6 @@ static drape_status measure_solver(bench *s, drape_profile *out)
     return DRAPE_OK;
 }
 
-static const drape_linear_ops *linear_of(const drape_chosen *chosen)
-{
-    double index = drape_chosen_integrator_value(chosen, "linear_solver", -1);
-    return index >= 0 ? drape_linears[(int)index] : NULL;
-}
-
 static drape_status measure(bench *s, drape_profile *out)
 {
     drape_status status = create(s);
@@ -276,7 +270,11 @@ static drape_status measure(bench *s, drape_profile *out)
 drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, drape_profile_term *terms,
                                    drape_profile *out)
 {
-    bench s = {.ctx = ctx, .arena = drape_arena_of(ctx), .sim = sim, .linear = linear_of(&sim->chosen)};
+    const double linear = drape_chosen_integrator_value(&sim->chosen, "linear_solver", -1);
+    bench s = {.ctx = ctx,
+               .arena = drape_arena_of(ctx),
+               .sim = sim,
+               .linear = linear >= 0 ? drape_linears[(int)linear] : NULL};
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
                            .linear_solver = s.linear ? s.linear->entry.name : "",

@@ -93,13 +93,6 @@ static double tolerance_of(const drape_sim *sim)
     return integrator->tolerance ? integrator->tolerance(sim->integrator) : NAN;
 }
 
-static drape_stepping stepping_of(const drape_chosen *chosen)
-{
-    if (chosen->integrator->own_steps)
-        return DRAPE_STEPS_FREE;
-    return chosen->controller->own_steps ? DRAPE_STEPS_PROPOSED : DRAPE_STEPS_COUNTED;
-}
-
 /* Creates a sim with nothing but its arena. */
 static drape_status open_sim(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                              drape_sim **out)
@@ -173,8 +166,10 @@ static drape_status start_sim(drape_sim *sim, int threads)
             sim->ctx, DRAPE_LOG_WARNING,
             "\"%s\" ignores restitution: it resolves contact by moving nodes, and cloth does not rebound",
             sim->chosen.integrator->entry.name);
-    drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
-                        drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    const drape_stepping stepping = sim->chosen.integrator->own_steps   ? DRAPE_STEPS_FREE
+                                    : sim->chosen.controller->own_steps ? DRAPE_STEPS_PROPOSED
+                                                                        : DRAPE_STEPS_COUNTED;
+    drape_schedule_init(&sim->schedule, stepping, drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     sim->max_attempts = sim->chosen.controller->max_attempts;
     return DRAPE_OK;
 }

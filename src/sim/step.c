@@ -372,12 +372,6 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 
 /* ---- One step, and an advance ---- */
 
-static drape_status notify_attempt(drape_sim *sim, const drape_attempt *attempt)
-{
-    drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
-    return drape_sim_notify(sim, &event);
-}
-
 /* The description of an attempt for the observers. */
 static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
                                bool accepted)
@@ -448,14 +442,14 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     drape_system_end_step(sim->system);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
-    /* Logs what was rejected, and why. */
-    char diagnostic[400];
     if (!attempt->accepted && !is_event(attempt) && sim->ctx->def.log) {
+        char diagnostic[400];
         describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
         drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
                   attempt->reason, drape_status_name(attempt->status), diagnostic);
     }
-    drape_status notified = notify_attempt(sim, attempt);
+    drape_status notified =
+        drape_sim_notify(sim, &(drape_event){.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt});
     drape_status reported = drape_events_report(sim);
     drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
