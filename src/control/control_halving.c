@@ -2,8 +2,8 @@
  * halving: a failed step is rolled back and retried at half the size. The schedule divides the nominal
  * interval dt into 2^level equal parts and raises the level with each retry, so that the parts always fill
  * the interval. It doubles the size again, by itself, after two accepted parts that end where one part of
- * twice the size would, unless the last one took many iterations (accept_part in sim/schedule.c). The run
- * ends if the size falls below dt_min or a step no longer changes the time.
+ * twice the size would, unless the last one took many iterations (drape_schedule_accept in sim/schedule.c).
+ * The run ends if the size falls below dt_min or a step no longer changes the time.
  */
 #include "control/halve.h"
 

@@ -123,7 +123,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return status;
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
     memcpy(out->v, e->v, e->nodes * sizeof *out->v);
-    /* Computes what the next step needs if this one is accepted. */
+    /* What the next step needs if this one is accepted. */
     const drape_implicit *c = &s->common;
     s->made.t = out->t;
     s->made.h = h;

@@ -391,7 +391,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     drape_status status = prepare(s, in, end, h, &t, info);
     if (!status && s->n > 0)
         status = solve(s, end, h, &t, info);
-    /* Stops a run whose steps have become so small that it no longer moves, as where nothing can yield. */
+    /* A run ends whose steps have become so small that it no longer moves, as where nothing can yield. */
     if (!status && !drape_step_moves(t - in->t, s->size, s->speed, t == s->span[1] || t == end, &s->tiny)) {
         info->h = t - in->t;
         s->crossing = s->crossed;
@@ -411,7 +411,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     out->t = t;
     info->h = t - in->t;
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
-    /* Adds the work, by the trapezoidal rule. */
+    /* The work, by the trapezoidal rule. */
     double after[2];
     measure_powers(s, out->t, after);
     info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);

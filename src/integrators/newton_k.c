@@ -143,7 +143,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_solve_report report;
     drape_implicit_backward_euler(&s->common, in, out->t, h, 1 / h * (1 / h));
     e->pins_ahead = drape_implicit_pins_ahead(&s->common, in, h);
-    /* Keeps the velocities with which steps began. A second attempt at the same step has the same past. */
+    /* The velocities with which steps began are kept. A second attempt at the same step has the same past. */
     bool again = in->t == s->past_time[0], follows = in->t == s->past_end;
     s->past_end = out->t;
     if (!again) {

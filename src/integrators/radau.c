@@ -383,7 +383,7 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
     for (int k = 1; !status && k <= MAX_ITERATIONS; k++) {
         info->iterations++;
         s->work.newton_iterations++;
-        /* Replaces -F in `force` by the corrections of Z; DRAPE_RETRY_LINEAR without factors. */
+        /* The corrections of Z take the place of -F in `force`; DRAPE_RETRY_LINEAR without factors. */
         const int64_t n = s->n;
         double *const rhs[STAGES] = {s->rhs, s->rhs + n, s->rhs + 2 * n};
         double *const solution[STAGES] = {s->correction, s->correction + n, s->correction + 2 * n};
@@ -563,7 +563,7 @@ static drape_status attempt(radau_state *s, const drape_local_attempt *a, drape_
     status = drape_local_error_test(&s->control, a, s->error_x, s->error_v, info);
     s->have_matrix &= status ? s->current : s->theta <= FAST && !s->touches;
     if (!status) {
-        /* Bounds what the error test proposed by what the iteration is likely to manage. */
+        /* What the error test proposed is bounded by what the iteration is likely to manage. */
         double *proposed = &s->control.made.proposed;
         if (s->hardest > 0)
             *proposed = fmin(*proposed, a->h * AIM / s->hardest);

@@ -270,8 +270,8 @@ drape_status drape_radau_matrix_solve_complex(drape_radau_matrix *m, const doubl
     }
     if (!(left <= LARGEST * first))
         return DRAPE_RETRY_LINEAR;
-    /* Adds to x the combination of the basis with the least residual: the Hessenberg matrix, by columns,
-     * is triangular, g is rotated. */
+    /* x is the combination of the basis with the least residual: the Hessenberg matrix, by columns, is
+     * triangular, g is rotated. */
     for (int j = count - 1; j >= 0; j--) {
         for (int i = j + 1; i < count; i++) {
             const complex_number known = product(h[i][j], g[i]);

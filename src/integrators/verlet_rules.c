@@ -226,8 +226,8 @@ static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
     }
     if (!s->box)
         return count;
-    /* Keeps the near points in the box of the point, in `room`, which may be *near; of all points, the first
-     * that fit. */
+    /* Only the near points in the box of the point push, in `room`, which may be *near; of all points, the
+     * first that fit. */
     int number = 0;
     for (int k = 0; k < count && number < DRAPE_MAX_NEIGHBOURS; k++) {
         const int32_t j = *near ? (*near)[k] : k;

@@ -141,7 +141,7 @@ static drape_status compute(drape_factored_jacobian *s, const drape_point *at, d
     drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
     drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian_without(s->system, &point, 0, positive ? 1 : 0, s->flat, s->linear->values);
-    /* Adds C and the masses; what is not in the pattern is lumped. */
+    /* C and the masses; what is not in the pattern is lumped. */
     const drape_pattern *p = drape_system_pattern(s->system);
     const drape_scalar_stiffness *c = &s->scalar;
     for (int32_t j = 0; j < c->n; j++)

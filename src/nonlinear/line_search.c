@@ -105,7 +105,7 @@ void drape_line_search_along(drape_line_search *s, const double *d, const double
         s->evaluated = false;
         if (!stays_feasible(s, d, p, longest))
             break;
-        /* Evaluates F at d + (before + a p), rounded as the caller adds them. */
+        /* F at d + (before + a p), rounded as the caller adds them. */
         drape_step_equation *e = s->equation;
         for (size_t i = 0; i < e->dofs; i++)
             s->trial[i] = d[i] + ((before ? before[i] : 0) + length_at(s, i) * p[i]);

@@ -58,8 +58,8 @@ static bool is_zero(const double *block, int64_t stride)
 
 drape_status drape_nonsymmetric_update(drape_nonsymmetric *s, const drape_point *point, const double *terms)
 {
-    /* Whether contact is a part of E - A. Not while bodies leave some cloth no room: with it, cloth was
-     * still in them half a second after they had parted, in one of the pinches of the tests, and in none
+    /* Contact is a part of E - A, but not while bodies leave some cloth no room: with it, cloth was still
+     * in them half a second after they had parted, in one of the pinches of the tests, and in none
      * without. */
     const bool contact = s->system && drape_system_has_friction(s->system) &&
                          !drape_contact_exempts(drape_system_contact(s->system)) &&

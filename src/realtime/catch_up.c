@@ -65,7 +65,7 @@ drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rat
     bool goes = drape_motion_sends_pins(motion, part.t, part.end) &&
                 drape_motion_moves_as_one(motion, 0, sim->model->node_count, now->x, part.end, part.common);
     vec3_add_scaled(dropped, part.common, ahead);
-    /* Whether the cloth can go ahead by that, with the colliders that are sent. */
+    /* The cloth can go ahead by that, with the colliders that are sent, if it stays apart from the others. */
     for (int32_t c = 0; c < sim->model->collider_count && goes; c++)
         goes = drape_motion_sends_collider(motion, c, part.t, part.end) || stays_apart(sim, c, ahead);
     for (int k = 0; k < 3; k++) {

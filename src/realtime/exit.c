@@ -223,7 +223,7 @@ static void gather(search *s)
 {
     const drape_model *m = s->c->model;
     memset(s->patches, 0, (size_t)m->node_count * sizeof *s->patches);
-    /* Joins the nodes of faces that are marked in patches, the first node of each at its root. */
+    /* The nodes of faces that are marked are joined in patches, the first node of each at its root. */
     for (int32_t i = 0; i < m->node_count; i++)
         s->parent[i] = i;
     for (int32_t f = 0; f < m->triangle_count; f++)

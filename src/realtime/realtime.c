@@ -328,8 +328,8 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
             p = plan_stretched(sim, owed, frame_dt, budget);
         drape_realtime_set_effort(sim, p.effort);
         if (p.steps > 0) {
-            /* Sets the end of the call and, if the sim counts steps, their size h; integrators and
-             * controllers that choose their own steps continue to do so. */
+            /* The end of the call and, if the sim counts steps, their size h; integrators and controllers
+             * that choose their own steps continue to do so. */
             drape_schedule *s = &sim->schedule;
             if (s->stepping == DRAPE_STEPS_COUNTED)
                 drape_schedule_init(s, s->stepping, p.h, drape_sim_state(sim)->t);

@@ -70,7 +70,7 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_bool(a, &s->stepped);
     drape_archive_bool(a, &s->anew);
     drape_archive_bool(a, &s->cut);
-    /* Checks what the loops over steps and frames depend on to end. */
+    /* What the loops over steps and frames depend on to end. */
     if (drape_archive_good(a) &&
         !(s->level >= 0 && s->level <= DRAPE_SCHEDULE_LEVELS && s->part >= 0 &&
           s->part < (int64_t)1 << s->level && s->count >= 0 && !(s->dt < 0) && !isnan(s->dt) &&
@@ -173,7 +173,7 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
         if (masses)
             drape_archive_doubles(a, sim->masses, nodes);
     }
-    /* Of a run on several ranks, integrators are restarted, and what they have done is that of earlier ones. */
+    /* of a run on several ranks, integrators are restarted: what they have done is that of earlier ones */
     drape_work work = sim->earlier;
     if (a->by_ranks && !a->reading)
         work = drape_work_sum(sim->chosen.integrator->work(sim->integrator), &work);

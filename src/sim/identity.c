@@ -266,7 +266,7 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
         sim->choices_hash = choices_hash(sim);
         sim->identity_known = true;
     }
-    /* Whether several ranks share the model, which any number of them can then read. */
+    /* With "ranks", several ranks share the model; any number of them can read it then. */
     char kind[DRAPE_ARCHIVE_TEXT];
     snprintf(kind, sizeof kind, m->part ? "ranks" : "identity");
     drape_archive_text(a, kind, sizeof kind);

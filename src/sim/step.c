@@ -174,7 +174,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     /* what slides or flows leaves the elastic energy, and so stays in the balance */
     sim->audit.dissipated += drape_state_relax(sim->model, drape_sim_state(sim),
                                                sim->chosen.integrator->steady_state, next_state(sim));
-    /* Makes the new state the present one. The present one joins the past states that the controller
+    /* The new state becomes the present one. The one before joins the past states that the controller
      * wants; the oldest of these is overwritten next. */
     int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
     for (int k = 0; k < history_depth; k++) {
