@@ -201,8 +201,8 @@ static void destroy_vectors(drape_first_order *f)
     N_VDestroy(s->far);
 }
 
-/* As IDA chooses it: y, with the rate, changes by half of its tolerance; at most a thousandth of the span without
- * a kink. Waves that are set off there are resolved, unless the tolerance is larger. */
+/* As IDA chooses it: y, with the rate, changes by half of its tolerance; at most a thousandth of the span
+ * without a kink. Waves that are set off there are resolved, unless the tolerance is larger. */
 static double first_step(const drape_first_order *f)
 {
     const double h = FIRST_SHARE * (f->span[1] - f->span[0]), norm = drape_first_order_norm(f, f->rate);

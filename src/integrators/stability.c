@@ -7,8 +7,8 @@
  * Orthogonality is gradually lost; that repeats eigenvalues of T but moves none out of the spectrum.
  *
  * K u = (g(x + e u) - g(x))/e at v = 0, where no dashpot and no drag has a force; D u likewise with v. e
- * moves no node by more than the root of epsilon, 1e-8, of the shortest edge: on that scale elements are linear
- * up to 1e-8, and the effect of rounding x is as much.
+ * moves no node by more than the root of epsilon, 1e-8, of the shortest edge: on that scale elements are
+ * linear up to 1e-8, and the effect of rounding x is as much.
  */
 #include "integrators/stability.h"
 

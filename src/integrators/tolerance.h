@@ -33,18 +33,19 @@
  * smooth fall oscillates by half a percent: a larger gain means that waves are amplified. */
 #define DRAPE_LOCAL_ERROR_GAIN 0.02
 
-/* Of the error tolerance: bound for the error that Newton's iteration leaves, the largest that Hairer & Wanner 1996
- * advise (IV.8, kappa). With IDA's own, 0.33, an undamped sheet of E h = 1e9 N/m lost a third of its energy in
- * 0.5 s at rtol 1e-3 and ended 0.22 m off; with this a tenth, and 0.04 m off. */
+/* Of the error tolerance: bound for the error that Newton's iteration leaves, the largest that Hairer &
+ * Wanner 1996 advise (IV.8, kappa). With IDA's own, 0.33, an undamped sheet of E h = 1e9 N/m lost a third
+ * of its energy in 0.5 s at rtol 1e-3 and ended 0.22 m off; with this a tenth, and 0.04 m off. */
 #define DRAPE_NEWTON_SHARE 0.1
 
 /* Where all nodes are pinned no error bounds a step, whose work by pins and colliders is yet a sum over
  * steps: the least number of steps in the duration of the scene. */
 #define DRAPE_STEPS_WITHOUT_UNKNOWNS 200
 
-/* What a step is beside that which its local error would allow, how much larger and smaller than the one before
- * it may be, and the relative error below which it is noise: growth is limited there in any case (Hairer, Norsett &
- * Wanner 1993, II.4). A growth below DRAPE_STEP_KEPT is not worth new factors (Hairer & Wanner 1996, IV.8). */
+/* What a step is beside that which its local error would allow, how much larger and smaller than the one
+ * before it may be, and the relative error below which it is noise: growth is limited there in any case
+ * (Hairer, Norsett & Wanner 1993, II.4). A growth below DRAPE_STEP_KEPT is not worth new factors (Hairer &
+ * Wanner 1996, IV.8). */
 #define DRAPE_STEP_SAFETY 0.9
 #define DRAPE_STEP_GROWTH 5.0
 #define DRAPE_STEP_CUT    0.2
@@ -59,11 +60,11 @@ double drape_step_factor(double error, double before, int power);
 /* Replaces NaN by the derived value that the parameters describe. */
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
 
-/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure. Whether so many
- * steps of the second of simulated time that t is in have been attempted, with one from t, unless it does not
- * count: steps that end an advance are the host's choice, and those are left out. The bound is a rate, so that it
- * does not depend on how a host divides its advances; a host that continues after the failure gets the same number
- * of steps again. *second, *steps: kept between steps. */
+/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure.
+ * Whether so many steps of the second of simulated time that t is in have been attempted, with one from t,
+ * unless it does not count: steps that end an advance are the host's choice, and those are left out. The
+ * bound is a rate, so that it does not depend on how a host divides its advances; a host that continues
+ * after the failure gets the same number of steps again. *second, *steps: kept between steps. */
 bool drape_steps_exhausted(double t, double most, bool counts, double *second, int64_t *steps);
 
 /* Whether a run whose last step had this size still moves. False: DRAPE_MAX_TINY_STEPS in a row were tiny, as

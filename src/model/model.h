@@ -12,8 +12,9 @@
 #include "model/render_mesh.h"
 #include "sparse/pattern.h"
 
-/* The largest magnitude [in SI units, or degrees] that lists of a scene may have, keys of tracks and histories,
- * pivots, velocities, and what hosts give; and the latest time. Others have ranges of their own. */
+/* The largest magnitude [in SI units, or degrees] that lists of a scene may have, keys of tracks and
+ * histories, pivots, velocities, and what hosts give; and the latest time. Others have ranges of their
+ * own. */
 #define DRAPE_MOST 1e9
 /* Share of the scene's size, or of a step, by which places, or times, may be apart that count as the same. */
 #define DRAPE_SAME 1e-9

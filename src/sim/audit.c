@@ -24,7 +24,7 @@
 #define ROUNDED (4096 * DBL_EPSILON)
 #define AT_REST 1e-3 /* fraction of the scene's own energy, below which a run is at rest */
 #define QUIET                                                                                                \
-    DBL_EPSILON /* fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
+    DBL_EPSILON /* Fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error. */
 
 /* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
  * error, let it oscillate by some per cent. */

@@ -12,9 +12,10 @@
  * long. */
 #define EVENT_TOLERANCE 1e-11
 #define ROUNDING        (8 * DBL_EPSILON)
-#define ROOM            (2 * (DRAPE_EVENT_SAMPLES - 1)) /* roots of a continuous event function in a step, at most */
-#define MAX_TRIES       64  /* of a step that is to end at a root; bisection of 1e8 s to the tolerance */
-#define NEAR            0.5 /* of the values around it: an extremum of the cubic below this is evaluated */
+/* Roots of a continuous event function in a step, at most. */
+#define ROOM      (2 * (DRAPE_EVENT_SAMPLES - 1))
+#define MAX_TRIES 64  /* of a step that is to end at a root; bisection of 1e8 s to the tolerance */
+#define NEAR      0.5 /* of the values around it: an extremum of the cubic below this is evaluated */
 
 static double tolerance_at(double t)
 {

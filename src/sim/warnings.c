@@ -301,10 +301,11 @@ static bool iterates_long(drape_sim *sim, char *text, size_t size)
     if (integrator->order != 1 || isnan(drape_chosen_integrator_value(&sim->chosen, "max_iterations", NAN)) ||
         integrator->steady_state || sim->chosen.controller->own_steps || !(iterations(&s) > TOO_MANY))
         return false;
-    snprintf(text, size,
-             "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt is more accurate "
-             "there and often takes hardly longer",
-             integrator->entry.name, iterations(&s));
+    snprintf(
+        text, size,
+        "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt is more accurate "
+        "there and often takes hardly longer",
+        integrator->entry.name, iterations(&s));
     return true;
 }
 

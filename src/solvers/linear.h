@@ -20,7 +20,8 @@
 #define DRAPE_LINEAR_TOLERANCE 1e-2
 #define DRAPE_LINEAR_TIGHT     1e-4
 
-/* Unknowns of a matrix that is factored where that can be avoided: at a third of these, factors take 1.6 GB. */
+/* Unknowns of a matrix that is factored where that can be avoided: at a third of these, factors take 1.6
+ * GB. */
 #define DRAPE_MOST_FACTORED 1000000
 
 typedef struct drape_linear_ops drape_linear_ops;

@@ -66,11 +66,11 @@ START_TEST(they_agree_at_tight_tolerances)
 }
 END_TEST
 
-/* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps, or down to
- * one less. The steps at rtol 1e-4 are some 20, of which the first ones are as short as those at 1e-9, and where
- * waves of the sheet are stiff the stages, of order 2, take away some of the order. With steps of one size,
- * tests/time/test_order.c measures the orders. A variable order may be higher than its limit where low
- * orders suffice for the loose tolerance. */
+/* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps,
+ * or down to one less. The steps at rtol 1e-4 are some 20, of which the first ones are as short as those
+ * at 1e-9, and where waves of the sheet are stiff the stages, of order 2, take away some of the order.
+ * With steps of one size, tests/time/test_order.c measures the orders. A variable order may be higher than
+ * its limit where low orders suffice for the loose tolerance. */
 static void check_order(const char *method, const char *setting, int order)
 {
     char more[40];
@@ -118,8 +118,8 @@ START_TEST(runs_end_at_their_ends)
 }
 END_TEST
 
-/* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the
- * method, and of the trapezoidal rule in two powers, which falls with the tolerance: rtol 1e-3 and 1e-7 of the
+/* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the method,
+ * and of the trapezoidal rule in two powers, which falls with the tolerance: rtol 1e-3 and 1e-7 of the
  * scene's size in each of the 10 to 100 steps that dissipate most. */
 START_TEST(the_energy_balance_is_kept)
 {
