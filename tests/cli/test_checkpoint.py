@@ -249,7 +249,7 @@ def test_a_later_failure():
     first = contents("out")
     found.append(drape("run", "scene.json", "--out", "out", "--resume"))
     equal([result.returncode for result in found], [1, 1], found[0].stderr)
-    equal(found[0].stderr, found[1].stderr)
+    equal(*(without_warnings(result.stderr) for result in found))  # the second begins with those that apply to its checkpoint
     equal(contents("out"), first)
 
 
