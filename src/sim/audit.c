@@ -23,8 +23,8 @@
  * step size: small steps gain little each. */
 #define ROUNDED (4096 * DBL_EPSILON)
 #define AT_REST 1e-3 /* fraction of the scene's own energy, below which a run is at rest */
-#define QUIET                                                                                                \
-    DBL_EPSILON /* Fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error. */
+/* Fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error. */
+#define QUIET DBL_EPSILON
 
 /* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
  * error, let it oscillate by some per cent. */

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 
-from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, signalled, write_scene
+from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, signalled, without_warnings, write_scene
 
 ALL = "npy,obj,ply,vtp,pc2,glb,usd"
 
