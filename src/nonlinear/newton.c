@@ -58,8 +58,6 @@
 /* Fraction of the scene's size: a shorter correction changes nothing. */
 #define STEP_TOLERANCE (4 * DBL_EPSILON)
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MAX_LENGTH     2    /* of a correction by positive parts with contact; without, there is no limit */
-#define EXACT          0.1  /* of the residual, that an iterative solver may leave in an exact correction */
 #define SMALL_STEP     0.03 /* of an edge: after a shorter correction the exact matrix is tried again */
 #define MAX_AHEAD      0.1  /* of an edge: pins further ahead of the guess pull it along */
 #define MAX_CHORDS     2    /* simplified corrections after one correction, without contact */
@@ -458,8 +456,8 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
 static drape_status advance(drape_newton *s, const double *d, double fraction, double *p)
 {
     drape_step_equation *e = s->equation;
-    const bool definite = !s->positive && (!s->matrix->ops->exact || s->tolerance <= EXACT);
-    const double longest = !s->positive ? 1 : e->x_ahead ? MAX_LENGTH : INFINITY;
+    const bool definite = !s->positive && (!s->matrix->ops->exact || s->tolerance <= DRAPE_LINEAR_TOLERANCE);
+    const double longest = s->positive && !e->x_ahead ? INFINITY : 1;
     /* Along the first corrections, which are long. If they have not led near a solution, the sheet may be
      * buckling: then forces extrapolated along a correction are meaningless, and the iteration may cycle. */
     double start = drape_system_clock(e->system);
