@@ -22,7 +22,7 @@ from .sim import Sim
 
 Table = Any  # a pandas.DataFrame or, without pandas, a dictionary of arrays
 
-_STEPS = ("attempt", "t", "h", "accepted", "status", "reason", "iterations", "residual", "tolerance", "error")
+_STEPS = ("attempt", "t", "h", "accepted", "status", "reason", "iterations", "residual", "tolerance", "error", "left")
 _ENERGY = ("frame", "t", "t_state", "kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical")
 
 
@@ -255,7 +255,7 @@ def record_sim(sim: Sim, until: Optional[float]) -> Run:
     def observe(event):
         if event.kind == EventKind.ATTEMPT:
             a = event.attempt
-            row = (a.index, a.t, a.h, int(a.accepted), _name(a.status), a.reason, a.iterations, a.residual, a.tolerance, a.error)
+            row = (a.index, a.t, a.h, int(a.accepted), _name(a.status), a.reason, a.iterations, a.residual, a.tolerance, a.error, a.left)
             for name, value in zip(_STEPS, row):
                 steps[name].append(value)
         elif event.kind == EventKind.FRAME:

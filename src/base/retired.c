@@ -19,6 +19,10 @@ static const struct {
     {"integrator", {"max_speed", "max_substeps", "safety", "strain_limit_tolerance"}},
     {"controller",
      {"dt_max", "every", "least_iterations", "max_attempts", "max_substeps", "most_iterations", "safety"}},
+    /* of methods that have it no more: the mode of the DEP report is that of be, and of static */
+    {"bdf2", {"on_failure"}},
+    {"midpoint", {"on_failure"}},
+    {"trbdf2", {"on_failure"}},
     {"stretch.edge", {"min_length"}},
     {"stretch.cst", {"min_area"}},
     {"stretch.curve", {"min_area"}},

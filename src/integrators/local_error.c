@@ -7,6 +7,10 @@
 #include <float.h>
 #include <math.h>
 
+/* With 0.9 rosenbrock was rejected 1.4 times as often in contact, for 1.26 times the error at the same CPU
+ * time. */
+#define SAFETY    0.8
+#define MIN_ERROR 1e-2 /* below, the growth is limited anyway, and the ratio of two errors is noise */
 /* Share of the time in which the scene moves by its size that the first step takes at an error of 1. A
  * step that is too long costs one attempt, one that is too short a few to grow by DRAPE_STEP_GROWTH. */
 #define START_SHARE 0.1
@@ -117,16 +121,16 @@ double drape_local_error_norm(const drape_local_error *c, const double *ex, cons
     return sqrt(sum / (6.0 * fmax(1, m->free_count)));
 }
 
-/* Without bounds: h e^(-1/q), less the safety. Far below DRAPE_LEAST_ERROR it is as good as infinite. */
+/* Without bounds: h e^(-1/q), less the safety. Far below MIN_ERROR it is as good as infinite. */
 static double elementary(const drape_local_error *c, double h, double error)
 {
-    return DRAPE_STEP_SAFETY * h * drape_pow(fmax(error, DBL_EPSILON), -1 / c->power);
+    return SAFETY * h * drape_pow(fmax(error, DBL_EPSILON), -1 / c->power);
 }
 
 static double propose(const drape_local_error *c, const drape_local_attempt *a, double error)
 {
     const drape_step_record *past = &c->past;
-    const double e = fmax(error, DRAPE_LEAST_ERROR), simple = elementary(c, a->h, error);
+    const double e = fmax(error, MIN_ERROR), simple = elementary(c, a->h, error);
     /* the error of a much shorter step is rounding */
     if (a->cut && !a->again)
         return a->h > DRAPE_STEP_CUT * past->proposed ? fmin(simple, past->proposed) : past->proposed;
@@ -166,7 +170,7 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
     const bool whole = !a->cut || a->again;
     c->made = (drape_step_record){.end = a->t1,
                                   .h = whole ? a->h : c->past.h,
-                                  .error = whole ? fmax(error, DRAPE_LEAST_ERROR) : c->past.error,
+                                  .error = whole ? fmax(error, MIN_ERROR) : c->past.error,
                                   .proposed = propose(c, a, error)};
     info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     return DRAPE_OK;

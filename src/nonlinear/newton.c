@@ -69,8 +69,9 @@
 /* Corrections where cloth touches something, however little time there is: what fewer leave throws it about,
  * so that later steps need more (docs/realtime.md, "What is saved first"). */
 #define MIN_IN_CONTACT 3
-/* Corrections in a solve after which a larger step of the same motion might fail. */
-#define MANY 10
+/* A solve is laborious after more iterations than the larger of these: a number, and a share of the most. */
+#define EASY       10
+#define EASY_SHARE 0.4
 
 const char *const drape_newton_norms[] = {
     [DRAPE_NORM_MAX] = "max", [DRAPE_NORM_L1] = "l1", [DRAPE_NORM_L2] = "l2", NULL};
@@ -611,7 +612,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     drape_status status = status_of(code, &report->reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
-    report->laborious = !s->effort.keeps && iterations > MANY;
+    report->laborious = !s->effort.keeps && (double)iterations > fmax(EASY, EASY_SHARE * s->effort.most);
     e->work.newton_iterations += iterations;
     /* KINSOL could not go on because all that is left, besides islands that are done, is rounding. */
     const drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];

@@ -46,6 +46,9 @@ static drape_status apply(drape_context *ctx, const choice *c, int chosen, const
             memcpy(values + drape_param_place(entry->params, p), value,
                    (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
     }
+    if (known && drape_param_find(c->registry->entries[chosen]->params,
+                                  c->registry->entries[chosen]->param_count, setting->name) < 0)
+        drape_retired(c->quiet ? NULL : ctx, at, c->registry->entries[chosen]->name, setting->name);
     if (known || drape_retired(c->quiet ? NULL : ctx, at, c->registry->noun, setting->name))
         return DRAPE_OK;
     const char *keys[MAX_KEYS]; /* of all entries, each once */

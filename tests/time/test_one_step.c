@@ -278,14 +278,14 @@ START_TEST(sizes_follow_the_errors)
     ck_assert(first > 0 && first < 0.1);
     ck_assert_int_eq(try_with(&k, end, end, 0.5, &a, &info), DRAPE_OK);
     assert_below(fabs(a.h / (5 * first) - 1), 1e-14);
-    const double second = a.h, simple = 0.9 * second * pow(0.5, -0.25),
-                 predicted = simple * (second / first) * pow(1e-4 / 0.5, 0.25); /* errors count from 1e-4 */
+    const double second = a.h, simple = 0.8 * second * pow(0.5, -0.25),
+                 predicted = simple * (second / first) * pow(1e-2 / 0.5, 0.25); /* errors count from 1e-2 */
     ck_assert_int_eq(try_with(&k, end, end, 40, &a, &info), DRAPE_RETRY_REJECTED);
     assert_below(fabs(a.h / fmin(simple, predicted) - 1), 1e-14);
     ck_assert_str_eq(info.reason, "error_test");
     ck_assert(info.h == a.h && info.diagnostic.node[0] >= 0);
     assert_below(fabs(info.diagnostic.value - 40), 1e-12);
-    assert_below(fabs(info.retry / (0.9 * a.h * pow(40, -0.25)) - 1), 1e-14);
+    assert_below(fabs(info.retry / (0.8 * a.h * pow(40, -0.25)) - 1), 1e-14);
     const double retry = info.retry;
     ck_assert_int_eq(try_with(&k, end, retry, 1e-6, &a, &info), DRAPE_OK);
     ck_assert(a.h == retry);
