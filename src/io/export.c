@@ -210,6 +210,15 @@ void drape_obj_put_name(drape_file *file, const char *statement, const char *nam
     put_name(file, statement, name, strlen(name));
 }
 
+/* One statement for each line of the names. */
+static void put_names(drape_file *file, const char *statement, const char *names)
+{
+    for (const char *end = names; *end; names = end + 1) {
+        end = names + strcspn(names, "\n");
+        put_name(file, statement, names, (size_t)(end - names));
+    }
+}
+
 void drape_obj_put_material_files(drape_file *file, const drape_render_surface *surface)
 {
     for (int32_t c = 0; c < surface->cloth_count; c++) {
@@ -219,10 +228,8 @@ void drape_obj_put_material_files(drape_file *file, const drape_render_surface *
             const char *other = surface->cloths[b].mesh->faces.material_file;
             named = other && strcmp(own, other) == 0;
         }
-        for (const char *name = own, *end; !named && *name; name = end + 1) { /* a statement for each line */
-            end = name + strcspn(name, "\n");
-            put_name(file, "mtllib", name, (size_t)(end - name));
-        }
+        if (!named)
+            put_names(file, "mtllib", own);
     }
 }
 
