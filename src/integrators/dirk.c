@@ -39,7 +39,8 @@
 #define GAMMA_CHANGE    0.2
 #define FIRST_SHARE     1e-3
 #define FIRST_CHANGE    0.5
-#define MAX_CORRECTIONS 6 /* of the undamped Newton iteration */
+#define ERROR_FAILS     10 /* of the error test in a step, as IDA has it */
+#define MAX_CORRECTIONS 6  /* of the undamped Newton iteration */
 /* Large steps of a stiff sheet, which the error would allow, need several new matrices in each stage; more
  * steps of half the size need fewer. Above one matrix a stage steps shrink by EFFORT_SHRINK, above half of
  * one they do not grow. At a tolerance of 1e-2 this saves a quarter to half of the time. Where contact is as
@@ -188,7 +189,7 @@ static bool create_arkode(drape_first_order *f)
            !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
            !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
-           !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) &&
+           !ARKStepSetMaxNonlinIters(m, MAX_CORRECTIONS) && !ARKStepSetMaxErrTestFails(m, ERROR_FAILS) &&
            !ARKStepSetNonlinConvCoef(m, DRAPE_NEWTON_SHARE) && !ARKStepSetMaxHnilWarns(m, -1) &&
            !ARKStepSetMaxStep(m, drape_first_order_max_step(f));
 }

@@ -12,7 +12,6 @@
 #include "solvers/sundials_memory.h"
 
 #include <ida/ida.h>
-#include <math.h>
 
 #define LOOSE_ORDER 2
 #define TIGHT_ORDER 5

@@ -12,8 +12,6 @@
  */
 #include "integrators/implicit.h"
 
-#include <string.h>
-
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {

@@ -24,7 +24,6 @@
 #include "integrators/local_error.h"
 #include "solvers/sun_linear.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -33,8 +32,8 @@ enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 /* Of the step: the interval of the differences for f_t. Their truncation error is its square times the third
  * derivative, their rounding error 1e-16 over it: 1e-8 and 1e-12 of what the term adds. */
 #define DIFFERENCE 1e-4
-/* Of the stages: the step along them for the derivative of the power, a difference of first order. */
-#define ALONG sqrt(DBL_EPSILON)
+/* Of the stages, which are short beside positions: the step along them for the derivative of the power. */
+#define ALONG 1e-6
 
 /* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of order 3, RODAS3
  * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the

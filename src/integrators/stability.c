@@ -7,14 +7,17 @@
  * Orthogonality is gradually lost; that repeats eigenvalues of T but moves none out of the spectrum.
  *
  * K u = (g(x + e u) - g(x))/e at v = 0, where no dashpot and no drag has a force; D u likewise with v. e
- * moves no node by more than the root of epsilon, 1e-8, of the shortest edge: on that scale elements are
- * linear up to 1e-8, and the effect of rounding x is as much.
+ * moves no node by more than 1e-6 of the shortest edge: on that scale elements are linear up to 1e-6, and
+ * rounding x, which grows with the distance from the origin, is 1e-10 of the difference of the forces for
+ * each edge of that distance.
  */
 #include "integrators/stability.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
+
+#define MOVE 1e-6 /* of the shortest edge */
 
 struct drape_spectrum {
     drape_system *system;
@@ -54,7 +57,7 @@ drape_status drape_spectrum_create(drape_arena *arena, drape_system *system, int
     double shortest = m->length;
     for (int32_t e = 0; e < m->edge_count; e++)
         shortest = fmin(shortest, m->edge_length[e]);
-    s->move = sqrt(DBL_EPSILON) * shortest;
+    s->move = MOVE * shortest;
     for (int32_t f = 0; f < m->free_count; f++)
         s->root[f] = 1 / sqrt(m->mass[m->node_of_free[f]]);
     return DRAPE_OK;
@@ -137,7 +140,7 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
         s->b[n] = normalise(s->u, dofs);
         n++;
         if (!(s->b[n - 1] * s->b[n - 1] > DBL_EPSILON * a * a))
-            break; /* an eigenvalue is off by b^2 / |a| at most, or numbers are not finite */
+            break; /* b bounds the error of an eigenvalue, 1e-8 of |a|; or numbers are not finite */
     }
     /* The largest eigenvalue of T, by bisection of the interval of Gershgorin's circles. */
     double low = 0, high = 0;

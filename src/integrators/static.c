@@ -22,7 +22,8 @@
 
 #define MAX_FAILS  40   /* in a row */
 #define MIN_FACTOR 0.02 /* of m from one step to the next */
-/* the same, used also while the residual does not fall: then the flow is far from its end */
+/* the same, used also while the residual does not fall by as much: then the flow is far from its end, or
+ * the residual may be rounding */
 #define MAX_FACTOR  0.5
 #define FAIL_FACTOR 4.0 /* of m after a failure */
 /* Of the static residual, that a step may leave in its own equation; and the iterations after which m stays

@@ -4,7 +4,6 @@
 #include "nonlinear/line_search.h"
 
 #include <math.h>
-#include <string.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #define UNKNOWN  20.0 /* error left after a correction with new factors: a rate of 0.95, as IDA assumes */

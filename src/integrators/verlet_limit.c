@@ -186,12 +186,7 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
         worst = fmax(worst, l->pinned[a] && l->pinned[b] ? 0 : square / (longest * longest));
         *moved = true;
         const bool pinned0 = l->pinned[a], pinned1 = l->pinned[b];
-        const double share0 = pinned0   ? 0
-                              : pinned1 ? 1
-                                        : 0.5,
-                     share1 = pinned1   ? 0
-                              : pinned0 ? 1
-                                        : 0.5,
+        const double share0 = pinned0 ? 0 : 0.5 * (1 + pinned1), share1 = pinned1 ? 0 : 0.5 * (1 + pinned0),
                      by = 1 - longest / sqrt(square);
         for (size_t k = 0; k < 3; k++) {
             double *to = l->x + k * (size_t)l->node_count;

@@ -35,8 +35,6 @@
 #include "nonlinear/newton.h"
 
 #include "base/clock.h"
-#include "base/elementary.h"
-#include "base/finite.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "nonlinear/exact_jacobian.h"
@@ -452,12 +450,11 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
     return DRAPE_OK;
 }
 
-/* Takes the correction p, of which contact has left a fraction, from d as far as the search says. An
- * iterative solver that leaves much of the residual is no exact matrix. */
+/* Takes the correction p, of which contact has left a fraction, from d as far as the search says. */
 static drape_status advance(drape_newton *s, const double *d, double fraction, double *p)
 {
     drape_step_equation *e = s->equation;
-    const bool definite = !s->positive && (!s->matrix->ops->exact || s->tolerance <= DRAPE_LINEAR_TOLERANCE);
+    const bool definite = !s->positive;
     const double longest = s->positive && !e->x_ahead ? INFINITY : 1;
     /* Along the first corrections, which are long. If they have not led near a solution, the sheet may be
      * buckling: then forces extrapolated along a correction are meaningless, and the iteration may cycle. */

@@ -7,8 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#define FAR_FROM_ROUNDING 1e3 /* times the last estimate of a solve */
-#define MAX_PASSES        3   /* of shortening a displacement at nodes */
+#define FAR_FROM_ROUNDING 1e3  /* times the last estimate of a solve */
+#define PROBED            1e-6 /* of the displacement of pins: their pull is a difference over that much */
+#define MAX_PASSES        3    /* of shortening a displacement at nodes */
 
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
@@ -165,14 +166,12 @@ static void evaluate_with_pins(drape_step_equation *s, const double *zero, doubl
 
 void drape_step_equation_pull(drape_step_equation *s, double *zero, double *f)
 {
-    const double share =
-        sqrt(DBL_EPSILON); /* of the displacement of pins: their pull is a difference over it */
     memset(zero, 0, s->dofs * sizeof *zero);
-    evaluate_with_pins(s, zero, share);
+    evaluate_with_pins(s, zero, PROBED);
     memcpy(f, s->f, s->dofs * sizeof *f);
     evaluate_with_pins(s, zero, 0);
     for (size_t i = 0; i < s->dofs; i++)
-        f[i] = s->f[i] + (f[i] - s->f[i]) / share;
+        f[i] = s->f[i] + (f[i] - s->f[i]) / PROBED;
 }
 
 typedef struct norms {
