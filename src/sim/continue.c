@@ -7,7 +7,6 @@
 #include "sim/attach.h"
 #include "sim/rescue.h"
 
-#include <math.h>
 #include <string.h>
 
 /* ---- State ---- */

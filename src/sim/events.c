@@ -8,11 +8,11 @@
 #include <math.h>
 #include <string.h>
 
-/* [s] To this a step ends at its root; a tenth of what is promised. Times are rounded by more if they are
- * long. */
+/* [s] To this a step ends at its root; a tenth of what is promised. Large times are rounded by more. */
 #define EVENT_TOLERANCE 1e-11
 #define ROUNDING        (8 * DBL_EPSILON)
-/* Roots of a continuous event function in a step, at most. */
+/* Roots of a continuous event function in a step, at most: one between samples, and at extrema of the
+ * cubic. */
 #define ROOM      (2 * (DRAPE_EVENT_SAMPLES - 1))
 #define MAX_TRIES 64  /* of a step that is to end at a root; bisection of 1e8 s to the tolerance */
 #define NEAR      0.5 /* of the values around it: an extremum of the cubic below this is evaluated */

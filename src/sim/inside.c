@@ -11,7 +11,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define ACROSS 6 /* parts of a side: 28 points of a face are tested */
 
@@ -105,7 +104,8 @@ static double depth_at(const search *s, const double *point)
 }
 
 /* Whether no point of a triangle is inside. A distance changes by no more than that from the centroid, and
- * rounding errors are far below DRAPE_SAME: most triangles need one evaluation, not that of all samples. */
+ * rounding errors are far below DRAPE_PENETRATION_TOLERANCE: most triangles need one evaluation, not that
+ * of all samples. */
 static bool is_outside(const search *s, const int32_t *node)
 {
     double centroid[3] = {0, 0, 0}, radius = 0;
@@ -116,7 +116,7 @@ static bool is_outside(const search *s, const int32_t *node)
         vec3_sub(s->cloth.x + 3 * (size_t)node[a], centroid, to);
         radius = fmax(radius, vec3_norm(to));
     }
-    return depth_at(s, centroid) < -(1 + DRAPE_SAME) * radius - DRAPE_SAME * s->model->length;
+    return depth_at(s, centroid) < -(1 + DRAPE_PENETRATION_TOLERANCE) * radius - DRAPE_PENETRATION_TOLERANCE;
 }
 
 static double deepest_sample(const search *s, const int32_t *node)
@@ -165,7 +165,7 @@ drape_status drape_find_inside(drape_context *ctx, const drape_model *m, const d
         if (status || drape_model_ignores(m, collider->index, m->triangle[3 * (size_t)f]))
             continue;
         const double depth = fmax(deepest_sample(&s, m->triangle + 3 * (size_t)f), deepest_between(&s, f));
-        found->triangles += depth > DRAPE_SAME * s.model->length || is_pierced(&s, f);
+        found->triangles += depth > DRAPE_PENETRATION_TOLERANCE || is_pierced(&s, f);
         found->deepest = fmax(found->deepest, depth);
     }
     drape_arena_free(&arena);

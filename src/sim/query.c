@@ -104,16 +104,15 @@ static double enter(const ray *r, double outside, double inside)
  * it. */
 static bool meets(const ray *r, double length, double *t)
 {
-    const double met = DRAPE_SAME * length;
     double before = 0;
     *t = 0;
-    for (double distance; (distance = distance_at(r, *t, NULL)) > met;) {
+    for (double distance; (distance = distance_at(r, *t, NULL)) > DRAPE_PENETRATION_TOLERANCE;) {
         if (*t >= length)
             return false;
         before = *t;
         *t = fmin(*t + fmax(distance, LEAST * length), length);
     }
-    if (distance_at(r, *t, NULL) < -met && *t > 0)
+    if (distance_at(r, *t, NULL) < -DRAPE_PENETRATION_TOLERANCE && *t > 0)
         *t = enter(r, before, *t);
     return true;
 }

@@ -4,7 +4,6 @@
  * that led to the present state is discarded.
  */
 #include "base/elementary.h"
-#include "base/finite.h"
 #include "model/support.h"
 #include "sim/rescue.h"
 

@@ -9,9 +9,10 @@
 #include "sim/events.h"
 #include "sim/schedule.h"
 
-#define DRAPE_MAX_OBSERVERS   8
-#define DRAPE_MAX_HOST_EVENTS 64
-#define DRAPE_MAX_REASONS     32 /* the last one is "other" if there are more */
+#define DRAPE_PENETRATION_TOLERANCE 1e-9 /* [m] a point that is less deep in a collider is on its surface */
+#define DRAPE_MAX_OBSERVERS         8
+#define DRAPE_MAX_HOST_EVENTS       64
+#define DRAPE_MAX_REASONS           32 /* the last one is "other" if there are more */
 
 typedef struct drape_reason_total {
     const char *reason; /* static text */

@@ -85,8 +85,9 @@ static bool has_unused_clamp(drape_sim *sim, char *text, size_t size)
         const drape_cloth *cloth = &m->cloths[pin->cloth];
         const bool read = takes_clamps(m, pin->cloth);
         bool clamps = false;
-        for (int32_t e = 0; cloth->edge_clamped && e < cloth->mesh.edge_count; e++)
-            clamps = clamps || cloth->edge_clamped[e];
+        for (int32_t e = 0;
+             pin->clamps && read && cloth->edge_clamped && !clamps && e < cloth->mesh.edge_count; e++)
+            clamps = cloth->edge_clamped[e];
         if (!pin->clamps || (read && clamps))
             continue;
         snprintf(text, size,
@@ -173,7 +174,7 @@ static int32_t free_nodes_inside(drape_context *ctx, const drape_model *m, const
         if (drape_model_ignores(m, collider->index, m->node_of_free[f]))
             continue;
         const double depth = -drape_collider_distance(collider, pose, at, NULL, NULL);
-        count += depth > DRAPE_SAME * m->length;
+        count += depth > DRAPE_PENETRATION_TOLERANCE;
         *deepest = fmax(*deepest, depth);
     }
     return count;
