@@ -97,6 +97,9 @@ extern const drape_registry drape_verb_registry;
 
 void cli_print_help(const drape_verb *verb); /* on stdout */
 
+/* The operand as help shows it: in brackets if it is optional. */
+void cli_operand_text(const drape_verb *verb, char *text, size_t size);
+
 /* Reads a command line into a request, in which all but arena and ctx is zero. Returns CLI_GO_ON, or the exit
  * code after help or an error was printed. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);
@@ -123,6 +126,10 @@ int cli_report_memory(const cli_command *command);
 /* Prints a value, whose reference it takes over: all of it or a message. The caller has set errno to 0 before
  * it made the value. Returns the exit code. */
 int cli_print_json(const cli_command *command, json_t *value, size_t flags);
+
+/* Finds a shading by its name; NULL: the default one. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was
+ * printed. */
+int cli_find_shading(const cli_command *command, const char *name, int *index);
 
 /* ---- Ctrl-C, SIGTERM and SIGHUP: they request a stop, which all stages of a verb check for ---- */
 
@@ -162,10 +169,6 @@ void cli_progress_count(cli_progress *progress, int64_t done, int64_t total, dou
 /* Erases the line until it is shown again, for other output on the terminal; or for good. */
 void cli_progress_hide(cli_progress *progress);
 void cli_progress_clear(cli_progress *progress);
-
-/* Finds a shading by its name; NULL: the default one. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was
- * printed. */
-int cli_find_shading(const cli_command *command, const char *name, int *index);
 
 /* ---- Scenes ---- */
 

@@ -36,7 +36,7 @@ static json_t *described(json_t *value, const char *unit)
     return json_pack("{s:o, s:s, s:b}", "value", value, "unit", unit, "plain", true);
 }
 
-/* Or a parameter, which has no "plain". */
+/* Whether a value is described, or a parameter, which has no "plain". */
 static bool is_described(const json_t *value)
 {
     return json_is_string(json_object_get(value, "unit"));

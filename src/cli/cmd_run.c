@@ -204,13 +204,15 @@ static drape_status run_realtime(realtime *r, const cli_scene *scene)
         s->dropped = report.dropped_total;
         r->estimates = !isnan(report.error_bound);
         if (r->count == r->capacity) {
-            r->capacity = r->capacity ? 2 * r->capacity : 256;
-            double *more = drape_arena_resize(r->command->arena, r->seconds, r->capacity, sizeof *more);
-            if (!more)
-                return status ? status : DRAPE_E_MEMORY;
-            r->seconds = more;
+            const size_t capacity = r->capacity ? 2 * r->capacity : 256;
+            double *more = drape_arena_resize(r->command->arena, r->seconds, capacity, sizeof *more);
+            r->seconds = more ? more : r->seconds;
+            r->capacity = more ? capacity : r->capacity;
         }
-        r->seconds[r->count++] = report.seconds;
+        if (r->count < r->capacity)
+            r->seconds[r->count++] = report.seconds;
+        else
+            status = status ? status : DRAPE_E_MEMORY;
     }
     if (!status) /* the debt of the last frames, without a deadline */
         status = drape_sim_advance(scene->sim, end);

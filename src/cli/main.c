@@ -42,8 +42,7 @@ static int help(int argc, char **argv)
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
     char operand[64];
     for (int i = 0; drape_verbs[i]; i++) {
-        snprintf(operand, sizeof operand, drape_verbs[i]->operand_optional ? "[%s]" : "%s",
-                 drape_verbs[i]->operand);
+        cli_operand_text(drape_verbs[i], operand, sizeof operand);
         printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
     puts("\n  drape VERB --help   show the arguments of a verb\n"

@@ -58,11 +58,16 @@ static void print_option(const char *name, const char *argument, const char *tex
     printf("  %-24s %s\n", left, text);
 }
 
+void cli_operand_text(const drape_verb *verb, char *text, size_t size)
+{
+    snprintf(text, size, verb->operand_optional ? "[%s]" : "%s", verb->operand);
+}
+
 void cli_print_help(const drape_verb *verb)
 {
     const option_list list = list_options(verb);
     char operand[64];
-    snprintf(operand, sizeof operand, verb->operand_optional ? "[%s]" : "%s", verb->operand);
+    cli_operand_text(verb, operand, sizeof operand);
     printf("usage: drape %s %s [options]\n\n%s\n\n", verb->entry.name, operand, verb->details);
     for (size_t i = 0; i < list.count; i++)
         print_option(list.options[i]->name, list.options[i]->argument, list.options[i]->help);

@@ -7,7 +7,6 @@
 #include "model/scene.h"
 
 #include <stdio.h>
-#include <string.h>
 #include <sys/stat.h>
 
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)

@@ -331,9 +331,10 @@ static drape_status remove_one(drape_folder *f, const char *name, const claims *
 {
     struct stat info = {0};
     char prefix[DRAPE_PART_SIZE];
-    const size_t length = (size_t)put_prefix(f, prefix);
+    const bool own = !c->writes && !f->shared;
+    const size_t length = own ? (size_t)put_prefix(f, prefix) : 0;
     const bool claimed = c->clears && c->clears(c->user, name),
-               part = !c->writes && !f->shared && strncmp(name, prefix, length) == 0 &&
+               part = own && strncmp(name, prefix, length) == 0 &&
                       strspn(name + length, "0123456789abcdef") == 16 &&
                       strcmp(name + length + 16, DRAPE_FILE_PART) == 0;
     if (!part && (!claimed || why_not_ours(f, name, &info) || is_input(f, &info)))

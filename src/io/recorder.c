@@ -142,7 +142,7 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     frame->pinned = r->pinned;
 }
 
-/* The same with z up. */
+/* The frame with z up. */
 static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
     size_t nodes = (size_t)r->model->surface.node_count;
@@ -662,7 +662,6 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     if (def->format_count && !def->formats)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
                           def->format_count);
-    drape_status status = DRAPE_OK;
     drape_archive *a = def->archive;
     drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
     if (drape_ranks_agree_memory(drape_model_ranks(sim->model), ctx, r)) {
@@ -679,7 +678,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
                           .counted = def->frames > 0};
     r->progress.writes = !r->ranks || r->ranks->rank == 0;
     scope s = scope_enter();
-    status = choose_outputs(r, def);
+    drape_status status = choose_outputs(r, def);
     if (!status)
         status = allocate_arrays(r);
     if (!status && r->progress.writes)

@@ -220,16 +220,15 @@ static void report_order(const sequence *s, FILE *out)
         else if (s->chooses_order)
             fprintf(out,
                     "it chooses its order, and another one at another rtol; a tenth of rtol divides the "
-                    "change by "
-                    "%.2g to %.2g%s",
+                    "change by %.2g to %.2g%s",
                     pow(10, low), pow(10, high),
                     strcmp(s->knob, BY_RTOL) == 0 ? "; a value of /integrator/order fixes it" : "");
         else
             fprintf(
                 out,
                 "it changes from refinement to refinement, between %.2g and %.2g, %.2g at the last: the "
-                "order "
-                "is not determined; try more levels, or a shorter duration, before small differences grow",
+                "order is not determined; try more levels, or a shorter duration, before small differences "
+                "grow",
                 low, high, local_order(s, s->count - 1));
     } else {
         if (is_tolerance(s))

@@ -108,6 +108,12 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
 
 /* ---- Lines ---- */
 
+static bool ends_in(const char *name, const char *ending)
+{
+    const size_t length = strlen(name), end = strlen(ending);
+    return length > end && strcmp(name + length - end, ending) == 0;
+}
+
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
     json_error_t fault;
@@ -135,11 +141,9 @@ static drape_status read_lines(lab *l, const char *folder, int64_t *found)
     drape_status status = DRAPE_OK;
     for (struct dirent *e = readdir(entries); e && !status; e = readdir(entries)) {
         char path[4096], *text;
-        size_t size = strlen(e->d_name);
+        size_t size;
         int64_t n = 1;
-        const size_t ending = strlen(".jsonl");
-        if (strncmp(e->d_name, "cases", 5) != 0 || size < ending ||
-            strcmp(e->d_name + size - ending, ".jsonl") != 0)
+        if (strncmp(e->d_name, "cases", 5) != 0 || !ends_in(e->d_name, ".jsonl"))
             continue;
         snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
         status = drape_file_read(l->ctx, path, DRAPE_MAX_TABLE, &text, &size);
@@ -455,12 +459,6 @@ static bool is_same(const json_t *a, const json_t *b)
     json_decref(x);
     json_decref(y);
     return same;
-}
-
-static bool ends_in(const char *name, const char *ending)
-{
-    const size_t length = strlen(name), end = strlen(ending);
-    return length > end && strcmp(name + length - end, ending) == 0;
 }
 
 /* The files that an experiment writes. */

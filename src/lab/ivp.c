@@ -119,7 +119,7 @@ static void complete_request(const lab *l, size_t index, lab_request *request)
 
 /* What is known of a scene. */
 typedef struct scene {
-    const json_t *about; /* describe_scene */
+    const json_t *about; /* of experiment.json */
     const char *name;
     const lab_series *series;
     size_t count; /* of these */

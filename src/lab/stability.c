@@ -243,7 +243,6 @@ static drape_status plan(lab *l)
         json_array_append_new(axes, drape_json_text(def->axes[a]));
     json_object_set_new(l->arguments, "axes", axes);
     json_object_set_new(l->arguments, "strain_limit", json_real(def->strain_limit));
-    json_object_set_new(l->about, "results", results);
     drape_status status = read_space(l, &s);
     if (!status)
         status = check_space(l, &s);
@@ -254,6 +253,7 @@ static drape_status plan(lab *l)
     }
     if (!status && def->result_count == 0 && s.count == 1)
         json_array_append_new(results, json_string("energy_drift"));
+    json_object_set_new(l->about, "results", results); /* last: a failure frees it */
     size_t inside = 0, stride = 1;
     for (int a = 0; !status && a < s.count; stride *= (size_t)s.axes[a++].count)
         inside += stride;

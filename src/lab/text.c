@@ -179,7 +179,7 @@ static int put_row(const lab_table *t, const char *kind, char *cells)
     FILE *page = t->l->page, *markdown = t->markdown;
     int count = 0;
     fputs("<tr>", page);
-    for (char *cell = cells, *end = cells; end; cell = end + 1, count++) {
+    for (char *cell = cells, *end; cell; cell = end ? end + 1 : NULL, count++) {
         end = strchr(cell, '\t');
         if (end)
             *end = 0;

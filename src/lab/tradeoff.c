@@ -3,10 +3,7 @@
  * under those that bound an error; every linear solver at one dt. Errors are distances from a reference
  * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
  */
-#include "lab/figure.h"
-
 #include "base/clock.h"
-#include "lab/lab.h"
 #include "lab/series.h"
 #include "lab/text.h"
 #include "model/model.h"

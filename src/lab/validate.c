@@ -70,7 +70,8 @@ int drape_validate_runs(const drape_reference *reference)
     return reference->high > 0 ? BISECTIONS : 1;
 }
 
-void drape_validate_judge(const drape_reference *reference, drape_validation *v)
+/* Fills all but parameter, obtained, seconds and message, which are given. */
+static void judge(const drape_reference *reference, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
     v->expected = drape_reference_expected(reference, v->parameter);
@@ -94,7 +95,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
                                .user = user};
     drape_status status = DRAPE_OK;
     *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
-    drape_validate_judge(reference, out);
+    judge(reference, out);
     if (reference->high > 0) {
         /* Bisects between a load at which the measure is 0 and one at which it is not. */
         const double about = reference->documented ? out->documented : out->expected;
@@ -114,7 +115,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
         out->obtained = NAN;
         snprintf(out->message, sizeof out->message, "%s", drape_context_message(ctx));
     }
-    drape_validate_judge(reference, out);
+    judge(reference, out);
     return status == DRAPE_E_MEMORY ? status : DRAPE_OK;
 }
 
@@ -189,36 +190,35 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
                               drape_folder **folder, drape_file *file)
 {
     drape_arena arena = drape_arena_of(ctx);
-    char *text, digits[17];
+    char *text = NULL, *rest = NULL, digits[17];
     size_t size;
     drape_status status = drape_folder_open(ctx, path, false, folder);
     if (!status)
         status = drape_folder_check(*folder, is_cases, NULL, NULL);
-    if (!status && !lab_read_text(&arena, path, NAME, &text, &size)) {
-        char *rest = NULL;
-        /* A line that is not JSON, as a kill may leave the last, is ignored. */
-        for (char *word = strtok_r(text, "\n", &rest); word; word = strtok_r(NULL, "\n", &rest)) {
-            json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
-            for (size_t i = 0; line && i < count; i++) {
-                lab_record *record = &records[i];
-                drape_validation *v = &record->v;
-                if (record->done || strcmp(lab_text(line, "name"), record->reference->entry.name) != 0 ||
-                    lab_number(line, "value") != record->reference->parameters[record->index] ||
-                    strcmp(lab_text(line, "drape"), drape_version()) != 0)
-                    continue;
-                hash_of(record, digits);
-                if (strcmp(lab_text(line, "scene_hash"), digits) != 0)
-                    continue;
-                *v = (drape_validation){.parameter = record->reference->parameters[record->index],
-                                        .obtained = lab_number(line, "obtained"),
-                                        .seconds = lab_number(line, "cpu_s")};
-                snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
-                drape_make_printable(v->message);
-                drape_validate_judge(record->reference, v);
-                record->done = true;
-            }
-            json_decref(line);
+    if (!status)
+        lab_read_text(&arena, path, NAME, &text, &size); /* NULL if there is no such file */
+    /* A line that is not JSON, as a kill may leave the last, is ignored. */
+    for (char *word = text ? strtok_r(text, "\n", &rest) : NULL; word; word = strtok_r(NULL, "\n", &rest)) {
+        json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
+        for (size_t i = 0; line && i < count; i++) {
+            lab_record *record = &records[i];
+            drape_validation *v = &record->v;
+            if (record->done || strcmp(lab_text(line, "name"), record->reference->entry.name) != 0 ||
+                lab_number(line, "value") != record->reference->parameters[record->index] ||
+                strcmp(lab_text(line, "drape"), drape_version()) != 0)
+                continue;
+            hash_of(record, digits);
+            if (strcmp(lab_text(line, "scene_hash"), digits) != 0)
+                continue;
+            *v = (drape_validation){.parameter = record->reference->parameters[record->index],
+                                    .obtained = lab_number(line, "obtained"),
+                                    .seconds = lab_number(line, "cpu_s")};
+            snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
+            drape_make_printable(v->message);
+            judge(record->reference, v);
+            record->done = true;
         }
+        json_decref(line);
     }
     drape_arena_free(&arena);
     if (!status)

@@ -101,9 +101,6 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
 /* Simulations that a case takes: the search of a threshold takes several. */
 int drape_validate_runs(const drape_reference *reference);
 
-/* Fills all but parameter, obtained, seconds and message, which are given. */
-void drape_validate_judge(const drape_reference *reference, drape_validation *v);
-
 /* What is expected of the case with that parameter. */
 double drape_reference_expected(const drape_reference *reference, double parameter);
 

@@ -260,6 +260,8 @@ static drape_status merge_uvs(drape_context *ctx, drape_faces *f)
     return DRAPE_OK;
 }
 
+/* ---- All ---- */
+
 drape_status drape_faces_complete(drape_context *ctx, drape_mesh *mesh)
 {
     drape_faces *f = &mesh->faces;

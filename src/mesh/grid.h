@@ -12,7 +12,7 @@ drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int6
  * machine. */
 double drape_grid_random(uint64_t *seed);
 
-/* The same check; then allocates rows x columns nodes and the triangles between them. */
+/* Checks that as drape_grid_check_size does; then allocates the nodes and the triangles between them. */
 drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
                                  drape_mesh *mesh);
 

@@ -12,7 +12,7 @@ drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char
     const drape_import_ops *import = NULL;
     char known[256] = "";
     size_t used = 0, length = strlen(file);
-    for (int i = 0; drape_imports[i]; i++) {
+    for (int i = 0; !import && drape_imports[i]; i++) {
         const char *ending = drape_imports[i]->ending;
         if (length > strlen(ending) && strcasecmp(file + length - strlen(ending), ending) == 0)
             import = drape_imports[i];

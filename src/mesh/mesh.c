@@ -26,20 +26,6 @@ drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source
                          text);
 }
 
-drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
-                              ...)
-{
-    char at[sizeof ctx->pointer], text[DRAPE_MESSAGE_SIZE];
-    const locale_t old = drape_locale_enter();
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    drape_locale_leave(old);
-    snprintf(at, sizeof at, "%s/%s", pointer, key);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "%s", text);
-}
-
 drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *source, size_t node_count,
                                  size_t triangle_count, drape_mesh *mesh)
 {

@@ -45,10 +45,6 @@ typedef struct drape_mesh_source {
 drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source, int64_t line,
                              const char *format, ...) DRAPE_PRINTF(4, 5);
 
-/* As drape_fail_at with DRAPE_E_ARGUMENT, at a key of the object at `pointer`: "/seams/0/name" for "name". */
-drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
-                              ...) DRAPE_PRINTF(4, 5);
-
 /* A grid: a mesh generated from parameters. Checks counts against DRAPE_MAX_NODES before allocating. */
 typedef struct drape_grid_ops {
     drape_entry entry;

@@ -245,6 +245,8 @@ static void read_parts(reader *r)
         FAIL(r, "its scene shows no triangles");
 }
 
+/* ---- Frames ---- */
+
 /* The map of joint k of a point, and its weight; NULL if that is 0: then the joint is any number. */
 static const drape_gltf_map *joint_of(const reader *r, const part *p, size_t point, int k, double *weight)
 {
