@@ -1045,17 +1045,15 @@ static drape_status check_terms(const drape_system *system, const double *given,
         drape_status status = term->ops->check(&el, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
-            const drape_elements *elements = &term->elements;
-            drape_diagnostic found = {.what = fault.what,
-                                      .term = term->ops->entry.name,
-                                      .element = fault.element,
-                                      .node = {-1, -1, -1, -1},
-                                      .cloth = term->cloth,
-                                      .value = fault.value,
-                                      .limit = fault.limit};
-            for (int a = 0; fault.element >= 0 && a < elements->nodes && a < 4; a++)
-                found.node[a] = elements->node[(size_t)fault.element * (size_t)elements->nodes + (size_t)a];
-            *diagnostic = found;
+            *diagnostic = (drape_diagnostic){.what = fault.what,
+                                             .term = term->ops->entry.name,
+                                             .element = fault.element,
+                                             .node = {-1, -1, -1, -1},
+                                             .cloth = term->cloth,
+                                             .value = fault.value,
+                                             .limit = fault.limit};
+            for (int a = 0; fault.element >= 0 && a < el.nodes && a < 4; a++)
+                diagnostic->node[a] = el.node[(size_t)fault.element * (size_t)el.nodes + (size_t)a];
             return status;
         }
     }

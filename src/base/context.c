@@ -189,6 +189,18 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
     return status;
 }
 
+drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
+                              ...)
+{
+    char at[sizeof ctx->pointer];
+    va_list args;
+    snprintf(at, sizeof at, "%s/%s", pointer, key);
+    va_start(args, format);
+    fail(ctx, DRAPE_E_ARGUMENT, at, format, args);
+    va_end(args);
+    return DRAPE_E_ARGUMENT;
+}
+
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
                                const char *format, ...)
 {

@@ -51,6 +51,9 @@ void drape_make_printable(char *text);
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
+/* As drape_fail_at with DRAPE_E_ARGUMENT, at a key of the object at `pointer`: "/seams/0/name" for "name". */
+drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
+                              ...) DRAPE_PRINTF(4, 5);
 /* For the status of a user-defined function, before whose call the message was cleared: if it failed without
  * setting a message, sets this one. Returns status. */
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,

@@ -39,13 +39,19 @@ static inline void vec3_add_scaled(double s, const double *a, double *out)
     out[2] += s * a[2];
 }
 
-/* The normal of length 1 of a triangle (three nodes) at x; 0 if it has no area. */
-static inline void vec3_triangle_normal(const int32_t *node, const double *x, double normal[3])
+/* Twice the area of a triangle (three nodes) at x, along its normal. */
+static inline void vec3_triangle_area(const int32_t *node, const double *x, double area[3])
 {
     double u[3], v[3];
     vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
     vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
-    vec3_cross(u, v, normal);
+    vec3_cross(u, v, area);
+}
+
+/* The normal of length 1 of a triangle (three nodes) at x; 0 if it has no area. */
+static inline void vec3_triangle_normal(const int32_t *node, const double *x, double normal[3])
+{
+    vec3_triangle_area(node, x, normal);
     const double length = vec3_norm(normal);
     for (int k = 0; k < 3; k++)
         normal[k] = length > 0 ? normal[k] / length : 0;

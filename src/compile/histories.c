@@ -13,24 +13,26 @@
 static drape_status check(drape_model *model, const char *pointer, const drape_scene_def *scene, size_t i)
 {
     const drape_history_def *def = &scene->histories[i];
-    char time[40], value[40];
     if (def->time_count == 0 || def->time_count != def->value_count)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                              "%zu times and %zu values; there is one value for each time, and at least one",
                              def->time_count, def->value_count);
     for (size_t k = 0; k < def->time_count; k++) {
-        snprintf(time, sizeof time, "times/%zu", k);
-        snprintf(value, sizeof value, "values/%zu", k);
+        const char *list = "times", *fault = NULL;
+        char key[40];
         if (!(fabs(def->times[k]) <= DRAPE_MOST))
-            return drape_fail_below(model->ctx, pointer, time, "a time is finite and within 1e9 s");
-        if (!(fabs(def->values[k]) <= DRAPE_MOST))
-            return drape_fail_below(model->ctx, pointer, value, "a factor is finite and within 1e9");
-        if (k > 0 && !(def->times[k] > def->times[k - 1]))
-            return drape_fail_below(model->ctx, pointer, time, "times must increase from key to key");
-        if (k > 0 &&
-            !(fabs(def->values[k] - def->values[k - 1]) <= MAX_SLOPE * (def->times[k] - def->times[k - 1])))
-            return drape_fail_below(model->ctx, pointer, time,
-                                    "the factor changes by more than 1e30 per second");
+            fault = "a time is finite and within 1e9 s";
+        else if (!(fabs(def->values[k]) <= DRAPE_MOST))
+            list = "values", fault = "a factor is finite and within 1e9";
+        else if (k > 0 && !(def->times[k] > def->times[k - 1]))
+            fault = "times must increase from key to key";
+        else if (k > 0 && !(fabs(def->values[k] - def->values[k - 1]) <=
+                            MAX_SLOPE * (def->times[k] - def->times[k - 1])))
+            fault = "the factor changes by more than 1e30 per second";
+        if (!fault)
+            continue;
+        snprintf(key, sizeof key, "%s/%zu", list, k);
+        return drape_fail_below(model->ctx, pointer, key, "%s", fault);
     }
     for (size_t k = 0; k < i; k++)
         if (strcmp(scene->histories[k].name, def->name) == 0)

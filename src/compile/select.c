@@ -1,7 +1,6 @@
 /* select.c: see select.h. */
 #include "compile/select.h"
 
-#include "compile/stages.h"
 #include "model/scene.h"
 #include "terms/load.h"
 

@@ -121,6 +121,25 @@ drape_status drape_active_set_add(drape_active_set *set, const drape_active_cont
     return DRAPE_OK;
 }
 
+static drape_pair_key key_of_pair(const drape_pair *pair)
+{
+    drape_pair_key key = {.kind = (int32_t)pair->kind, .collider = pair->collider};
+    memcpy(key.node, pair->node, sizeof key.node);
+    return key;
+}
+
+static int compare(const void *a, const void *b)
+{
+    return memcmp(a, b, sizeof(drape_pair_key));
+}
+
+static bool has_pair(const drape_inside_pairs *inside, const drape_pair *pair)
+{
+    const drape_pair_key key = key_of_pair(pair);
+    return inside->count > 0 &&
+           bsearch(&key, inside->keys, (size_t)inside->count, sizeof *inside->keys, compare);
+}
+
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
                                    const drape_inside_pairs *inside, bool all_inside,
@@ -143,7 +162,7 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
             continue;
         if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
-                             drape_inside_has(inside, pair);
+                             has_pair(inside, pair);
             drape_near_pair *near =
                 drape_list_grow(set->arena, set->near, set->near_count, &set->near_room, sizeof *near);
             if (!near)
@@ -159,25 +178,6 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
 }
 
 /* ---- Pairs that began inside ---- */
-
-static drape_pair_key key_of_pair(const drape_pair *pair)
-{
-    drape_pair_key key = {.kind = (int32_t)pair->kind, .collider = pair->collider};
-    memcpy(key.node, pair->node, sizeof key.node);
-    return key;
-}
-
-static int compare(const void *a, const void *b)
-{
-    return memcmp(a, b, sizeof(drape_pair_key));
-}
-
-bool drape_inside_has(const drape_inside_pairs *inside, const drape_pair *pair)
-{
-    const drape_pair_key key = key_of_pair(pair);
-    return inside->count > 0 &&
-           bsearch(&key, inside->keys, (size_t)inside->count, sizeof *inside->keys, compare);
-}
 
 drape_status drape_inside_add(drape_inside_pairs *inside, const drape_pair_key *key)
 {
@@ -204,7 +204,7 @@ bool drape_inside_update(drape_inside_pairs *inside, const drape_near_pair *near
     bool added = false;
     for (int32_t i = 0; i < count; i++) {
         const drape_inside_pairs old = {.keys = inside->keys, .count = before};
-        const bool had = drape_inside_has(&old, &near[i].pair);
+        const bool had = has_pair(&old, &near[i].pair);
         if (!had && !(near[i].gap < drape_pair_least_gap(&near[i].pair, rounding)))
             continue;
         const drape_pair_key key = key_of_pair(&near[i].pair);

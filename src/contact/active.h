@@ -9,7 +9,6 @@
 #include "base/archive.h"
 #include "contact/candidates.h"
 #include "contact/exempt.h"
-#include "contact/pair.h"
 
 /* The pairs that began below their least gap, at the start of a run or after its state was set, and have not
  * come out yet. A pair is known by its pieces. */
@@ -30,8 +29,6 @@ typedef struct drape_inside_pairs {
     drape_pair_key *keys; /* (count of room), ascending */
     int32_t count, room;
 } drape_inside_pairs;
-
-bool drape_inside_has(const drape_inside_pairs *inside, const drape_pair *pair);
 
 /* Keeps those of its pairs that are among the near ones, for at the others both barriers agree, and adds
  * those that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */

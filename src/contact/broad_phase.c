@@ -39,7 +39,7 @@ static void list_features(drape_broad_phase *s)
         for (int32_t k = 0; !c->ops->smooth && k < c->shape.triangle_count; k++)
             s->triangle_collider[triangles + k] = i;
         triangles += c->ops->smooth ? 0 : c->shape.triangle_count;
-        first += s->model->colliders[i].shape.point_count;
+        first += c->shape.point_count;
     }
 }
 
@@ -49,14 +49,9 @@ static void share_areas(drape_broad_phase *s)
     const drape_model *m = s->model;
     for (int32_t f = 0; f < m->triangle_count; f++) {
         const int32_t *node = m->triangle + 3 * (size_t)f;
-        const double *x = m->rest;
-        double u[3], w[3];
-        for (size_t k = 0; k < 3; k++) {
-            u[k] = x[3 * (size_t)node[1] + k] - x[3 * (size_t)node[0] + k];
-            w[k] = x[3 * (size_t)node[2] + k] - x[3 * (size_t)node[0] + k];
-        }
-        double c[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-        s->face_area[f] = 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
+        double area[3];
+        vec3_triangle_area(node, m->rest, area);
+        s->face_area[f] = vec3_norm(area) / 2;
         for (int a = 0; a < 3; a++)
             s->node_area[node[a]] += s->face_area[f] / 3;
     }
@@ -540,7 +535,7 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
             .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
             .rounding = s->rounding,
             .marked = want->marked};
-        self_query both = {*&q, q};
+        self_query both = {q, q};
         begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
         begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
         both.face.pair.distance = both.edge.pair.distance = distance;

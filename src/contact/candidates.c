@@ -4,7 +4,6 @@
 #include "base/lanes.h"
 #include "base/vec3.h"
 #include "contact/list.h"
-#include "contact/pair.h"
 
 #include <string.h>
 
@@ -17,8 +16,7 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
     const size_t marks = (size_t)(broad->points + broad->model->collider_count);
     for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++) {
         drape_candidate_set *set = &out->set[i];
-        set->away = drape_arena_take(arena, (size_t)(broad->points + broad->model->collider_count),
-                                     sizeof *set->away);
+        set->away = drape_arena_take(arena, marks, sizeof *set->away);
         for (int end = 0; end < 2; end++) {
             set->x[end] = drape_arena_take(arena, 3 * (size_t)broad->points, sizeof *set->x[end]);
             set->pose[end] =

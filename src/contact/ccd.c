@@ -4,7 +4,6 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
-#include "contact/pair.h"
 
 #include <float.h>
 #include <string.h>
@@ -91,12 +90,9 @@ static void follow(void *user, const drape_pair *pair)
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
-    if (p->of_node) {
-        /* The fraction of a pair that limits the displacement, for each of its nodes. */
-        for (int k = 0; k < 4; k++)
-            if (pair->node[k] < p->nodes)
-                p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
-    }
+    for (int k = 0; p->of_node && k < 4; k++) /* what limits the displacement of each node */
+        if (pair->node[k] < p->nodes)
+            p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
     if (fraction > p->fraction || (fraction == p->fraction && !drape_pair_is_before(pair, &p->limiting)))
         return;
     p->fraction = fraction;

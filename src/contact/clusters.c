@@ -134,20 +134,20 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
     /* The first cluster with a face that has them owns a node or an edge; those without faces belong to
      * the last one. */
     for (int32_t i = 0; i < m->triangle_count; i++) {
-        const int32_t face = b.faces->order[i], *n = m->triangle + 3 * (size_t)face,
+        const int32_t face = faces.order[i], *n = m->triangle + 3 * (size_t)face,
                       cluster = b.owner[DRAPE_ELEMENT_FACE][face];
         for (int a = 0; a < 3; a++) {
             const int32_t edge = drape_elements_of_edge(&b.edges, m->edge, n[a], n[(a + 1) % 3]);
             claim(&b, DRAPE_ELEMENT_NODE, n[a], cluster);
             if (edge < 0)
                 continue;
-            b.of->faces_of_edge[edge]++;
+            s->faces_of_edge[edge]++;
             claim(&b, DRAPE_ELEMENT_EDGE, edge, cluster);
         }
     }
     for (int kind = DRAPE_ELEMENT_NODE; kind <= DRAPE_ELEMENT_EDGE; kind++)
         for (int32_t i = 0; i < count_of(m, kind); i++)
-            claim(&b, (drape_element_kind)kind, i, b.of->count - 1);
+            claim(&b, (drape_element_kind)kind, i, s->count - 1);
     for (int kind = 0; !status && kind < DRAPE_ELEMENT_KINDS; kind++)
         status = list_elements(arena, &b, kind);
     if (status)
@@ -159,7 +159,7 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
         count += s->cluster[i].points;
     }
     s->point = drape_arena_take(arena, (size_t)count, sizeof *s->point);
-    memset(b.seen, 0, (size_t)b.model->node_count * sizeof *b.seen);
+    memset(b.seen, 0, (size_t)m->node_count * sizeof *b.seen);
     for (int32_t i = 0; s->point && i < s->count; i++)
         list_points(&b, i, s->point + s->cluster[i].first_point);
     return s->point ? DRAPE_OK : DRAPE_E_MEMORY;

@@ -3,8 +3,8 @@
  *
  *     broad_phase.c  pairs that no axis separates on a path, searched in trees of boxes (geometry/path_bvh.h)
  *     candidates.c   those that can become active near the path; where some points have left it, a patch
- *     pair.c         cheap lower bounds of a gap, which reject most neighbours
- *     pair.c         narrow phase: closest points, gap, normal and weights of a candidate, evaluated once
+ *     pair.c         cheap lower bounds of a gap, which reject most neighbours, and the narrow phase: closest
+ *                    points, gap, normal and weights of a candidate, evaluated once
  *     active.c       the active set: candidates whose gap is below the activation distance, equal ones merged
  *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
  *     restitution.c  the dissipative part of its normal force

@@ -27,7 +27,6 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
     for (size_t i = 0; i < count; i++)
         out->seen[i].gap = -INFINITY;
     /* Nodes in the order in which faces have them first, then those that no face has. */
-    const int32_t all = out->model->node_count;
     int32_t ordered = 0;
     for (int32_t f = 0; f < faces->count; f++)
         for (int a = 0; a < faces->nodes; a++) {
@@ -36,7 +35,7 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
                 out->order[ordered++] = node;
             listed[node] = true;
         }
-    for (int32_t i = 0; i < all; i++)
+    for (int32_t i = 0; i < model->node_count; i++)
         if (!listed[i])
             out->order[ordered++] = i;
     drape_arena_release(arena, listed);

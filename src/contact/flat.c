@@ -310,22 +310,21 @@ drape_status drape_flat_create(drape_arena *arena, const drape_clusters *cluster
     for (int32_t i = 0; complete && i < m->cloth_count; i++)
         lay_flat(&b, i, rest, &beside);
     if (complete) {
-        for (int32_t i = 0; i < b.clusters->count; i++) {
-            const drape_cluster *cluster = &b.clusters->cluster[i];
-            b.out->height[i] = INFINITY;
+        for (int32_t i = 0; i < clusters->count; i++) {
+            const drape_cluster *cluster = &clusters->cluster[i];
+            out->height[i] = INFINITY;
             for (int32_t g = 0; b.flat[cluster->cloth] && g < cluster->groups[DRAPE_ELEMENT_FACE]; g++)
                 set_group(&b, i, cluster->first_group[DRAPE_ELEMENT_FACE] + g);
         }
-        drape_flat *s = b.out;
-        for (int32_t i = b.clusters->branch_count - 1; i >= 0; i--) {
-            const int32_t first = i + 1, second = b.clusters->branches[i].second;
+        for (int32_t i = clusters->branch_count - 1; i >= 0; i--) {
+            const int32_t first = i + 1, second = clusters->branches[i].second;
             if (second == 0) {
                 set_leaf(&b, i);
                 continue;
             }
-            s->area[i] = cover(&s->area[first], &s->area[second]);
-            s->cloth[i] = s->cloth[first] == s->cloth[second] ? s->cloth[first] : -1;
-            s->leaves[i] = s->leaves[first] + s->leaves[second];
+            out->area[i] = cover(&out->area[first], &out->area[second]);
+            out->cloth[i] = out->cloth[first] == out->cloth[second] ? out->cloth[first] : -1;
+            out->leaves[i] = out->leaves[first] + out->leaves[second];
         }
         list_pairs(arena, &b);
     }

@@ -16,11 +16,10 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
     const drape_contact_def *def = &c->model->contact;
     const drape_pair *pair = &contact->pair;
     const drape_collider *collider = pair->collider >= 0 ? &c->model->colliders[pair->collider] : NULL;
+    const double friction = collider ? collider->friction : def->self_friction;
     if (contact->exempt > 0) {
         /* Exempt pairs: a bounded pressure, and no rebound. What pushes cloth out in addition to that does
          * not rub: with friction in proportion it would hold fast what it pushes. */
-        const double friction =
-            pair->collider >= 0 ? c->model->colliders[pair->collider].friction : def->self_friction;
         return (drape_contact_law){.distance = pair->distance,
                                    .low = DRAPE_BARRIER_BOUNDED,
                                    .stiffness = contact->exempt * def->relaxed_pressure * pair->area,
@@ -36,7 +35,7 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_activ
         .distance = pair->distance,
         .low = contact->gentle ? DRAPE_BARRIER_GENTLE : fmin(least, DRAPE_BARRIER_GENTLE),
         .stiffness = c->press.factor * def->stiffness * pair->area * (def->distance / pair->distance),
-        .friction = collider ? collider->friction : def->self_friction,
+        .friction = friction,
         .velocity = def->friction_velocity,
         .damping = (1 - e * e) / (1 + e * e),
         .restitution_velocity = def->restitution_velocity};
@@ -145,11 +144,10 @@ static void scatter(drape_contact *c, const drape_active_contact *contact, const
         double *moment = c->on_collider[collider].moment;
         const bool surface = contact->pair.kind == DRAPE_PAIR_SURFACE;
         for (int a = 0; a < contact->gap.closest.points; a++) {
-            const int32_t point = contact->pair.node[a];
             double own[3], x[3];
-            if (!surface && point < c->model->node_count)
+            if (!surface && node[a] < c->model->node_count)
                 continue;
-            memcpy(x, c->x + 3 * (size_t)point, sizeof x);
+            memcpy(x, c->x + 3 * (size_t)node[a], sizeof x);
             if (!surface)
                 vec3_add_scaled(drape_contact_arm(c, contact), contact->gap.closest.normal, x);
             drape_pose_own(&c->pose[contact->pair.collider], x, own);

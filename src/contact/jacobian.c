@@ -231,7 +231,7 @@ static void add_derivatives(const drape_contact *c, const request *want, double 
         }
         if (want->which == DRAPE_CONTACT_SYMMETRIC)
             symmetrize(contact->gap.closest.points, h);
-        add_blocks(c, &c->active.contacts[i], share, h, pattern, values);
+        add_blocks(c, contact, share, h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];

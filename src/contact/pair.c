@@ -2,7 +2,6 @@
 #include "contact/pair.h"
 
 #include "base/vec3.h"
-#include "contact/gap.h"
 
 #include <math.h>
 #include <string.h>
@@ -19,6 +18,12 @@ static find_closest *const finders[] = {NULL, drape_closest_point_triangle, drap
 int drape_pair_points(const drape_pair *pair)
 {
     return finders[pair->kind] ? 4 : 1;
+}
+
+/* The number of points of the first piece; the second has the others. */
+static int split_of(drape_pair_kind kind)
+{
+    return kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
 }
 
 #define D DRAPE_GAP_DOFS
@@ -194,7 +199,7 @@ bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, 
 static double least_activation(const drape_pair *pair, const drape_configuration *rest)
 {
     const drape_model *m = rest->model;
-    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int split = split_of(pair->kind);
     double x[4][3], shortest = INFINITY, d[3];
     if (!m->untangle.given)
         return 0;
@@ -272,7 +277,7 @@ void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const 
 static double approach_speed(drape_pair_kind kind, double p[4][3])
 {
     double mean[3] = {0}, first = 0, second = 0;
-    int split = kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int split = split_of(kind);
     for (int a = 0; a < 4; a++)
         vec3_add_scaled(0.25, p[a], mean);
     for (int a = 0; a < 4; a++) {
@@ -314,7 +319,7 @@ static double gap_at(const drape_pair *pair, const pair_path *path, double t, do
  * which they were as far apart along it: on a straight path they are never nearer in between than at both. */
 static double lead_at(const drape_pair *pair, const pair_path *path, const double normal[3], double t)
 {
-    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int split = split_of(pair->kind);
     double first = INFINITY, second = -INFINITY;
     for (int a = 0; a < 4; a++) {
         const double at = vec3_dot(normal, path->x[a]) + t * vec3_dot(normal, path->p[a]);
@@ -373,12 +378,6 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
 
 /* ---- Bounds ---- */
 
-/* The number of points of the first piece; the second has the others. */
-static int split_of(const drape_pair *pair)
-{
-    return pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
-}
-
 /* The points, relative to the first one at x: coordinates may be large. */
 static void gather_relative(const drape_pair *pair, const double *x, const double *from, double local[4][3])
 {
@@ -418,7 +417,7 @@ static double least_lead(int split, const double axis[3], double at[2][4][3], co
 
 double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y)
 {
-    const int split = split_of(pair), ends = y ? 2 : 1;
+    const int split = split_of(pair->kind), ends = y ? 2 : 1;
     double at[2][4][3], axis[3], bound = -INFINITY;
     gather_relative(pair, x, x, at[0]);
     if (y)
@@ -434,7 +433,7 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
 
 bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double *y, double distance)
 {
-    const int split = split_of(pair), ends = y ? 2 : 1;
+    const int split = split_of(pair->kind), ends = y ? 2 : 1;
     double at[2][4][3], axis[3];
     gather_relative(pair, x, x, at[0]);
     if (y)
@@ -450,7 +449,7 @@ bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double 
 
 double drape_bound_change(const drape_pair *pair, const double *x, const double *y)
 {
-    const int split = split_of(pair);
+    const int split = split_of(pair->kind);
     double move[4][3], mean[3] = {0}, largest[2] = {0};
     for (int a = 0; a < 4; a++) {
         const size_t at = 3 * (size_t)pair->node[a];

@@ -4,7 +4,6 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
-#include "contact/contact.h"
 
 #include <string.h>
 

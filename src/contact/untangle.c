@@ -31,7 +31,7 @@ static double between(const double *x, const int32_t *pair)
 static double area_of(const drape_untangler *u, int32_t face)
 {
     double n[3];
-    drape_untangle_area(u->x, u->model->triangle + 3 * (size_t)face, n);
+    vec3_triangle_area(u->model->triangle + 3 * (size_t)face, u->x, n);
     return vec3_norm(n) / 2;
 }
 

@@ -128,7 +128,7 @@ static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *
     for (int32_t f = 0; f < m->triangle_count; f++)
         if (u->piece[m->triangle[3 * (size_t)f]] == piece) {
             double n[3];
-            drape_untangle_area(u->x, m->triangle + 3 * (size_t)f, n);
+            vec3_triangle_area(m->triangle + 3 * (size_t)f, u->x, n);
             vec3_add_scaled(1, n, normal);
         }
     for (int k = 0; k < 3; k++)
@@ -279,7 +279,7 @@ static void note_piercing(void *user, int32_t edge, int32_t triangle)
     const double *a = p->x + 3 * (size_t)p->edge[2 * (size_t)edge],
                  *b = p->x + 3 * (size_t)p->edge[2 * (size_t)edge + 1], *o = p->u->x + 3 * (size_t)node[0];
     double n[3], oa[3], ob[3];
-    drape_untangle_area(p->u->x, node, n);
+    vec3_triangle_area(node, p->u->x, n);
     vec3_sub(a, o, oa);
     vec3_sub(b, o, ob);
     const double above = fabs(vec3_dot(n, oa)), below = fabs(vec3_dot(n, ob)),

@@ -46,10 +46,8 @@ static void note_crossing(void *user, int32_t edge, int32_t triangle)
     u->crossing = list;
     drape_crossing *found = &list[u->crossing_count++];
     const double *p = u->x + 3 * (size_t)a, *q = u->x + 3 * (size_t)ends[1], *o = u->x + 3 * (size_t)b;
-    double v[3], w[3], n[3], op[3], oq[3];
-    vec3_sub(u->x + 3 * (size_t)corner[1], o, v);
-    vec3_sub(u->x + 3 * (size_t)corner[2], o, w);
-    vec3_cross(v, w, n);
+    double n[3], op[3], oq[3];
+    vec3_triangle_area(corner, u->x, n);
     vec3_sub(p, o, op);
     vec3_sub(q, o, oq);
     const double above = fabs(vec3_dot(n, op)), below = fabs(vec3_dot(n, oq));
@@ -208,6 +206,8 @@ static bool spread(drape_untangler *u, int32_t count, bool through, double price
     for (int32_t i = 0; agree && i < count; i++) {
         const int32_t node = u->queue[i];
         const int8_t own = u->colour[node];
+        /* What it costs to move a node: a pin, more than all of the cloth, so that its part is not moved if
+         * another can be. */
         price[own] += u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : 2 * u->area);
         for (int32_t a = s->edges.first[node]; agree && a < s->edges.first[node + 1]; a++) {
             const int32_t e = s->edges.element[a], *ends = s->edge + 2 * (size_t)e,

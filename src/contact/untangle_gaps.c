@@ -83,7 +83,7 @@ static void normal_at(const drape_untangler *u, int32_t node, double n[3])
             double own[3];
             if (face < 0)
                 continue;
-            drape_untangle_area(u->x, s->triangle + 3 * (size_t)face, own);
+            vec3_triangle_area(s->triangle + 3 * (size_t)face, u->x, own);
             vec3_add_scaled(1, own, n);
         }
 }

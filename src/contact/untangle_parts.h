@@ -125,15 +125,6 @@ static inline double drape_untangle_wanted(const drape_untangler *u, double dist
     return u->def->gap * distance;
 }
 
-/* Twice the area of a triangle, along its normal. */
-static inline void drape_untangle_area(const double *x, const int32_t *node, double n[3])
-{
-    double v[3], w[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], v);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], w);
-    vec3_cross(v, w, n);
-}
-
 /* Finds all crossings of sheets, and adds the bounds that take them apart, and the passages. */
 drape_status drape_untangle_contours(drape_untangler *u);
 bool drape_untangle_passes(const drape_untangler *u, int32_t point, int32_t sheet);

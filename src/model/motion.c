@@ -44,15 +44,14 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
             return DRAPE_E_MEMORY;
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    const drape_model *m = motion->model;
-    motion->moved_count = m->moved_count;
-    for (int32_t i = 0; i < m->node_count; i++)
+    motion->moved_count = model->moved_count;
+    for (int32_t i = 0; i < model->node_count; i++)
         motion->place[i] = -1;
-    for (int32_t i = 0; i < m->moved_count; i++) {
-        motion->moved_node[i] = m->moved_node[i];
-        motion->moved_track[i] = m->moved_track[i];
-        motion->ride[i] = m->ride ? m->ride[m->moved_node[i]] : drape_ride_none();
-        motion->place[m->moved_node[i]] = i;
+    for (int32_t i = 0; i < model->moved_count; i++) {
+        motion->moved_node[i] = model->moved_node[i];
+        motion->moved_track[i] = model->moved_track[i];
+        motion->ride[i] = model->ride ? model->ride[model->moved_node[i]] : drape_ride_none();
+        motion->place[model->moved_node[i]] = i;
     }
     return DRAPE_OK;
 }
@@ -664,15 +663,15 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
 
 void drape_motion_place_collider(drape_motion *motion, int32_t collider, const drape_placement *by)
 {
+    drape_turn_path *turn = &motion->collider_turn[collider];
+    double from[9];
     compose(by, &motion->collider_placed[collider]);
     place_path(by, &motion->collider_path[collider]);
-    double from[9];
-    memcpy(from, motion->collider_turn[collider].from, sizeof from);
-    drape_rotation_product(by->turn, from, motion->collider_turn[collider].from);
-    drape_placement_turn(by, motion->collider_turn[collider].turn, motion->collider_turn[collider].turn);
+    memcpy(from, turn->from, sizeof from);
+    drape_rotation_product(by->turn, from, turn->from);
+    drape_placement_turn(by, turn->turn, turn->turn);
     for (int i = 0; i < 2; i++)
-        drape_placement_turn(by, motion->collider_turn[collider].rate[i],
-                             motion->collider_turn[collider].rate[i]);
+        drape_placement_turn(by, turn->rate[i], turn->rate[i]);
 }
 
 /* ---- Another motion ---- */
@@ -763,11 +762,11 @@ void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int
         motion->collider_path[c] = from->collider_path[before[c]];
         motion->collider_turn[c] = from->collider_turn[before[c]];
         motion->collider_placed[c] = from->collider_placed[before[c]];
-        if (m->colliders[c].shape.point_count == from->model->colliders[before[c]].shape.point_count &&
-            (m->colliders[c].shape.point_count == 0 ||
-             memcmp(m->colliders[c].shape.point, from->model->colliders[before[c]].shape.point,
-                    3 * (size_t)m->colliders[c].shape.point_count * sizeof *m->colliders[c].shape.point) ==
-                 0))
+        const drape_collider_shape *now = &m->colliders[c].shape,
+                                   *old = &from->model->colliders[before[c]].shape;
+        if (now->point_count == old->point_count &&
+            (now->point_count == 0 ||
+             memcmp(now->point, old->point, 3 * (size_t)now->point_count * sizeof *now->point) == 0))
             drape_deformation_copy(&motion->deformation[c], &from->deformation[before[c]]);
         keep_pose(motion, c, &from->model->colliders[before[c]], t);
     }

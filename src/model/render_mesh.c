@@ -51,10 +51,12 @@ void drape_render_values(const drape_model *model, const double *values, int wid
             double weights[3], sum = 0;
             for (int a = 0; a < 3; a++)
                 sum += weights[a] = fmax(to->bound[i].weights[a], 0);
+            for (int a = 0; a < 3; a++)
+                weights[a] /= sum;
             for (size_t k = 0; k < w; k++) {
                 out[w * i + k] = 0;
                 for (int a = 0; a < 3; a++)
-                    out[w * i + k] += weights[a] / sum * values[w * (size_t)to->bound[i].node[a] + k];
+                    out[w * i + k] += weights[a] * values[w * (size_t)to->bound[i].node[a] + k];
             }
         }
         out += w * count;

@@ -80,9 +80,9 @@ static void count(void *user, const char *text, size_t size)
 static bool is_one_line(const printer *p, json_t *value)
 {
     bool scalars = !json_is_object(value);
-    for (size_t i = 0; i < json_array_size(value); i++) {
+    for (size_t i = 0; scalars && i < json_array_size(value); i++) {
         const json_t *one = json_array_get(value, i);
-        scalars = scalars && !json_is_array(one) && !json_is_object(one);
+        scalars = !json_is_array(one) && !json_is_object(one);
     }
     if (scalars || p->put == count)
         return true;

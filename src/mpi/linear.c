@@ -87,7 +87,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *p, void **st
 
 /* ---- Factors ---- */
 
-/* Returns whether that failed here, as the next two. */
+/* Returns whether that failed here, as the next one. */
 static bool fill_matrix(mpi_linear *s, const double *values)
 {
     const drape_pattern *p = s->pattern;

@@ -230,17 +230,16 @@ static drape_exchange *plan(const drape_ranks *ranks, drape_arena *arena, int32_
         x = take(arena, ranks->count, wanted, asked, largest);
         status = drape_ranks_agree_memory(ranks, arena->ctx, x);
     }
-    if (!status) { /* asks the owners of the copies for them, whose places they get */
-        for (int k = 0; k < x->neighbour_count; k++) {
-            int32_t to = x->first_in[k];
-            for (int32_t i = 0; i < count; i++)
-                if (rank[i] == x->neighbour[k]) {
-                    x->in[to] = i;
-                    places[to++] = place[i];
-                }
-        }
-        send(r, x, (const char *)places, x->first_in, (char *)x->out, x->first_out, sizeof *places);
+    for (int k = 0; !status && k < x->neighbour_count; k++) {
+        int32_t to = x->first_in[k];
+        for (int32_t i = 0; i < count; i++)
+            if (rank[i] == x->neighbour[k]) {
+                x->in[to] = i;
+                places[to++] = place[i];
+            }
     }
+    if (!status) /* asks the owners of the copies for them, whose places they get */
+        send(r, x, (const char *)places, x->first_in, (char *)x->out, x->first_out, sizeof *places);
     drape_arena_free(&scratch);
     return status ? NULL : x;
 }

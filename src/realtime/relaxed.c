@@ -136,12 +136,12 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *conta
     set->solid = drape_arena_take(arena, colliders, sizeof *set->solid);
     set->logged = drape_arena_take(arena, colliders + 1, sizeof *set->logged);
     set->total = drape_arena_take(arena, colliders + 1, sizeof *set->total);
+    static const drape_collider_pose rest = {.displacement = {0}};
     for (size_t i = 0; !drape_arena_status(arena) && i < colliders; i++) {
         bound_of(&model->colliders[i].shape, set->bound + 4 * i);
         set->bound_t[i] = NAN;
         /* Parts without a radius, triangles of a mesh, or parts that enclose more than what is within
          * their radius: the middle is deeper. */
-        static const drape_collider_pose rest = {.displacement = {0}};
         const drape_collider_shape *shape = &model->colliders[i].shape;
         set->solid[i] = shape->point_count > 0 &&
                         (!(shape->radius > 0) || !model->colliders[i].ops->smooth ||

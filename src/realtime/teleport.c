@@ -11,7 +11,6 @@
 #include "sim/attach.h"
 #include "sparse/project.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Pins on a line, or a single one, leave a rotation free: then the smallest one is taken. This share of the
@@ -149,11 +148,12 @@ drape_status drape_teleport_pins(drape_sim *sim, int32_t count, const int32_t *n
         double v[3];
         const double *x = drape_sim_state(sim)->x;
         bool fast = false;
-        for (int32_t k = 0; k < count && !fast; k++) {
+        for (int32_t k = 0; sim->teleport_speed > 0 && k < count && !fast; k++) {
             double path[3];
+            if (!is_in(&m->cloths[c], nodes[k]))
+                continue;
             vec3_sub(positions + 3 * (size_t)k, x + 3 * (size_t)nodes[k], path);
-            fast = is_in(&m->cloths[c], nodes[k]) && sim->teleport_speed > 0 &&
-                   vec3_norm(path) > sim->teleport_speed * seconds;
+            fast = vec3_norm(path) > sim->teleport_speed * seconds;
         }
         if (!fast)
             continue;

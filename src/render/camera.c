@@ -1,6 +1,8 @@
 /* camera.c: see camera.h. */
 #include "render/camera.h"
 
+#include <string.h>
+
 #define HALF_ANGLE    0.26f /* tangent of half the smaller angle of view, 29 degrees, as of a portrait lens */
 #define MARGIN        1.12f
 #define RADIANS       0.017453292519943295f

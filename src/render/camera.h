@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
-#include <string.h>
 
 /* ---- Linear algebra: vectors of three floats, and 4 x 4 matrices by columns, as OpenGL takes them ---- */
 

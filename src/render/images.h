@@ -11,14 +11,14 @@
 drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const char *path,
                              const uint8_t *pixels, int width, int height, bool small);
 
-/* A repeating texture with mipmaps, of a file, or the built-in one if path is NULL. *out is unchanged on
- * failure. Errors: DRAPE_E_FILE (also if the file is not a PNG), DRAPE_E_MEMORY. */
 typedef enum drape_texture_kind {
     DRAPE_PATTERN, /* colour of the cloth; built-in: checks with the letter F, upright along v */
     DRAPE_HEIGHTS, /* red: the height, 0 to 1; alpha: 1 where the thread is metal; built-in: a woven relief */
     DRAPE_ENVIRONMENT /* the surroundings by longitude and latitude, linear; built-in: a room with lamps */
 } drape_texture_kind;
 
+/* A repeating texture with mipmaps, of a file, or the built-in one if path is NULL. *out is unchanged on
+ * failure. Errors: DRAPE_E_FILE (also if the file is not a PNG), DRAPE_E_MEMORY. */
 drape_status drape_texture(drape_context *ctx, drape_texture_kind kind, const char *path, GLuint *out);
 
 /* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab

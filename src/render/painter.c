@@ -432,7 +432,7 @@ static void set_lamp(const drape_stage *stage, panel_view *v)
     l->width = 2 * SHADOW_REACH * reach;
     l->range = far - near;
     l->radius = reach;
-    l->scale = (float)v->light.panel_height / (2 * v->view.ty);
+    l->scale = (float)l->panel_height / (2 * v->view.ty);
 }
 
 static void set_box(GLuint program, const char *name, const panel_view *v)

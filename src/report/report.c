@@ -87,7 +87,7 @@ static drape_status read_run(page *p, const char *folder)
     drape_free(ctx, scene);
     if (!status)
         status = drape_record_open(ctx, folder, p->model->node_count, &p->record);
-    char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
+    char *path = status ? NULL : drape_record_path(ctx, folder, DRAPE_SUMMARY_NAME);
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
     const int fd = drape_file_open(ctx, path);
@@ -355,7 +355,7 @@ static json_t *collider(const page *p, int32_t number)
         points = p->fields[i].collider == number ? &p->fields[i] : points;
     const drape_entry *entry = &c->ops->entry;
     const drape_collider_shape *shape = &c->shape;
-    json_t *parameters = json_object(), *corners = json_array();
+    json_t *parameters = json_object();
     for (int i = 0; i < entry->param_count; i++) {
         const double *value = c->values + drape_param_place(entry->params, i);
         const int width = drape_param_width(&entry->params[i]);
@@ -363,21 +363,23 @@ static json_t *collider(const page *p, int32_t number)
             drape_json_with(parameters, entry->params[i].name,
                             width > 1 ? drape_json_numbers(value, (size_t)width) : drape_json_number(*value));
     }
-    for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
-        corners = drape_json_append(corners, json_integer(shape->triangle[i]));
     json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(entry->name), "name",
                                drape_json_text(c->name), "parameters", parameters);
     /* The triangles, if it has some; the page draws other types by their parameters. The points of one that
      * deforms are in a block of their own. */
-    json_t *triangles = points ? json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", points->name, "count",
-                                           (int)shape->point_count, "low", drape_json_numbers(points->low, 3),
-                                           "step", drape_json_numbers(points->step, 3), "triangles", corners)
-                               : json_pack("{s:o, s:o}", "points",
-                                           drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
-                                           "triangles", corners);
-    if (shape->triangle_count > 0)
-        object = drape_json_with(object, "shape", json_incref(triangles));
-    json_decref(triangles);
+    if (shape->triangle_count > 0) {
+        json_t *corners = json_array();
+        for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
+            corners = drape_json_append(corners, json_integer(shape->triangle[i]));
+        json_t *triangles =
+            points ? json_pack("{s:s, s:i, s:o, s:o, s:o}", "block", points->name, "count",
+                               (int)shape->point_count, "low", drape_json_numbers(points->low, 3), "step",
+                               drape_json_numbers(points->step, 3), "triangles", corners)
+                   : json_pack("{s:o, s:o}", "points",
+                               drape_json_numbers(shape->point, 3 * (size_t)shape->point_count), "triangles",
+                               corners);
+        object = drape_json_with(object, "shape", triangles);
+    }
     if (c->track.key_count == 0 && c->turns.key_count == 0)
         return object;
     json_t *displacements = json_array(), *rotations = json_array();
@@ -429,9 +431,9 @@ static drape_status put_json(const page *p, drape_file *file)
            *times = json_array(), *numbers = json_array(), *fields = json_array();
     drape_arena scratch = drape_arena_of(p->ctx);
     uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
-    drape_status status = is_pinned ? read_columns(p, "steps.csv", &of_steps, &steps) : DRAPE_E_MEMORY;
+    drape_status status = is_pinned ? read_columns(p, DRAPE_STEPS_NAME, &of_steps, &steps) : DRAPE_E_MEMORY;
     if (!status)
-        status = read_columns(p, "energy.csv", &of_energies, &energies);
+        status = read_columns(p, DRAPE_ENERGY_NAME, &of_energies, &energies);
     if (is_pinned)
         drape_render_pinned(model, is_pinned);
     for (int32_t i = 0; is_pinned && i < model->surface.node_count; i++)

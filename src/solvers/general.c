@@ -21,10 +21,6 @@ extern const drape_linear_ops drape_linear_klu;
 
 /* ---- Scaling ---- */
 
-/* Scales the rows and columns of a matrix so that the largest magnitude of each is about 1 (Ruiz 2001, A
- * scaling algorithm to equilibrate both rows and columns norms in matrices). All factors are powers of 2, so
- * nothing is rounded. */
-
 /* Sets each step to a power of 2 near the inverse root of the largest magnitude, and multiplies the factors
  * by it. False if one is zero; *done stays true if all steps are 1. */
 static bool take_roots(int64_t n, const double *largest, double *step, double *factor, bool *done)
@@ -143,7 +139,9 @@ static drape_status factor_scaled(drape_general *g, double shift)
     return status;
 }
 
-/* The vectors of `refine` are the workspace. */
+/* Scales the rows and columns of a matrix so that the largest magnitude of each is about 1 (Ruiz 2001, A
+ * scaling algorithm to equilibrate both rows and columns norms in matrices). All factors are powers of 2, so
+ * nothing is rounded. The vectors of `refine` are the workspace. */
 static bool scale(drape_general *g, const double *values, bool symmetric)
 {
     g->lu.symmetric = symmetric;

@@ -113,6 +113,8 @@ static void find_direction(const double c[9], const double t0[3], wrinkle *w)
     }
 }
 
+/* ---- The law ---- */
+
 static void wrinkled(const double c[9], const double e[3], const double t0[3], const wrinkle *w, double t,
                      drape_tension *out)
 {

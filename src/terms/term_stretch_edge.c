@@ -73,9 +73,10 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
             dq[6 * i + 3 + k] = u[k] * inverse[i];
             dq[6 * i + k] = -dq[6 * i + 3 + k];
         }
+        const double scale = ddq ? inverse[i] / length : 0;
         double p[9];
         for (int k = 0; ddq && k < 9; k++)
-            p[k] = inverse[i] / length * ((k % 4 == 0) - u[k / 3] * u[k % 3]);
+            p[k] = scale * ((k % 4 == 0) - u[k / 3] * u[k % 3]);
         if (ddq)
             drape_pair_block(p, ddq + 36 * (size_t)i);
     }
