@@ -1,6 +1,14 @@
 /*
- * control.h: decides what to do with an attempted step. A controller is the constant drape_controller_<name>
- * of control_<name>.c.
+ * control.h: decides what becomes of an attempt at a step. A controller is the constant
+ * drape_controller_<name> of control_<name>.c. Its verdict is the first; others may change it (sim/step.c):
+ *
+ *     controller --ACCEPT------> events --ACCEPT--------------> the step is taken
+ *         |                        |------REPEAT--------------> again, to end at a root
+ *         |                        '------STOP
+ *         '------RETRY, STOP---> rescue --RETRY--> schedule --> again, with a smaller step
+ *                                  |      STOP <------'           (STOP if none is left)
+ *                                  |------REPEAT--------------> again, with other equations
+ *                                  '------SUBSTITUTE----------> another step is taken in its place
  */
 #ifndef DRAPE_CONTROL_CONTROL_H
 #define DRAPE_CONTROL_CONTROL_H
@@ -9,8 +17,10 @@
 
 typedef enum drape_verdict {
     DRAPE_ACCEPT,
-    DRAPE_RETRY, /* roll back and try again with a step of h_next */
-    DRAPE_STOP   /* roll back and stop; status says why */
+    DRAPE_RETRY,     /* roll back and try again with a step of h_next */
+    DRAPE_STOP,      /* roll back and end the advance; `stop` says why */
+    DRAPE_REPEAT,    /* roll back and try again: who says so has changed the schedule, or the equations */
+    DRAPE_SUBSTITUTE /* take the step that a rescue has put in the place of the attempt (sim/rescue.h) */
 } drape_verdict;
 
 /* An attempted step to be judged, and the judgement. */
@@ -27,9 +37,16 @@ typedef struct drape_trial {
                                                forces */
     void *integrator_state;
     drape_step_info *info; /* a controller that rejects a step sets reason and diagnostic */
-    drape_status status;   /* status of the attempt; on DRAPE_STOP, set to the negative status to return */
+    drape_status status;   /* of the attempt; if it is 0 or info->usable, `out` may be accepted */
+    drape_status stop;     /* set on DRAPE_STOP: the negative status with which the advance ends */
     double h_next;         /* [s] set on DRAPE_RETRY, and by controllers with own_steps on DRAPE_ACCEPT */
 } drape_trial;
+
+/* Whether there is no state `out` to accept. */
+static inline bool drape_trial_failed(const drape_trial *trial)
+{
+    return trial->status && !trial->info->usable;
+}
 
 typedef struct drape_controller_ops {
     drape_entry entry;

@@ -105,14 +105,13 @@ static double local_error(const double *values, const drape_trial *trial, int32_
 
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
-    if (trial->status && !trial->info->usable)
+    if (drape_trial_failed(trial))
         return drape_halve(values[PARAM_DT_MIN], trial);
     int32_t node;
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
     if (!(error <= 1)) { /* also rejects NaN */
         const double allowed = drape_pow(error, -1.0 / (trial->order + 1)),
                      factor = isnan(error) ? 0.5 : fmax(DRAPE_STEP_CUT, DRAPE_STEP_SAFETY * allowed);
-        trial->status = DRAPE_RETRY_REJECTED;
         trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
         trial->info->diagnostic =
             (drape_diagnostic){.what = "local error / tolerance",

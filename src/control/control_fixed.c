@@ -4,11 +4,8 @@
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     (void)values;
-    if (trial->status == DRAPE_OK || trial->info->usable)
-        return DRAPE_ACCEPT;
-    if (trial->status > 0)
-        trial->status = DRAPE_E_SOLVER;
-    return DRAPE_STOP;
+    trial->stop = trial->status > 0 ? DRAPE_E_SOLVER : trial->status;
+    return drape_trial_failed(trial) ? DRAPE_STOP : DRAPE_ACCEPT;
 }
 
 const drape_controller_ops drape_controller_fixed = {

@@ -15,9 +15,7 @@ static const drape_param params[PARAM_COUNT] = {
 
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
-    if (trial->status == DRAPE_OK || trial->info->usable)
-        return DRAPE_ACCEPT;
-    return drape_halve(values[PARAM_DT_MIN], trial);
+    return drape_trial_failed(trial) ? drape_halve(values[PARAM_DT_MIN], trial) : DRAPE_ACCEPT;
 }
 
 const drape_controller_ops drape_controller_halving = {

@@ -30,7 +30,7 @@ static const drape_param params[PARAM_COUNT] = {
 static double limit_of(drape_trial *trial)
 {
     double *limit = &trial->scratch[SCRATCH_LIMIT], *left = &trial->scratch[SCRATCH_LEFT];
-    bool failed = trial->status && !trial->info->usable;
+    bool failed = drape_trial_failed(trial);
     if (!failed && *left > 0) {
         --*left;
         return *limit;
@@ -48,7 +48,6 @@ static double limit_of(drape_trial *trial)
 
 static drape_verdict reject(const double *values, drape_trial *trial, double limit)
 {
-    trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = drape_reason_name(DRAPE_REASON_UNSTABLE);
     trial->info->diagnostic = (drape_diagnostic){.what = "step / stable step",
                                                  .term = "",
@@ -67,11 +66,11 @@ static drape_verdict reject(const double *values, drape_trial *trial, double lim
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status < 0)
-        return DRAPE_STOP;
+        return drape_halve(values[PARAM_DT_MIN], trial);
     double limit = limit_of(trial);
     if (trial->h > limit * (1 + SLACK))
         return reject(values, trial, limit);
-    if (trial->status && !trial->info->usable)
+    if (drape_trial_failed(trial))
         return drape_halve(values[PARAM_DT_MIN], trial);
     trial->h_next = fmax(values[PARAM_DT_MIN], fmin(DRAPE_STEP_SAFETY * limit, trial->dt));
     return DRAPE_ACCEPT;

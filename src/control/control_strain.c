@@ -73,12 +73,8 @@ static bool too_far(const double *values, drape_trial *trial)
 
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
-    if (trial->status && !trial->info->usable)
-        return drape_halve(values[PARAM_DT_MIN], trial);
-    if (!too_far(values, trial))
-        return DRAPE_ACCEPT;
-    trial->status = DRAPE_RETRY_REJECTED;
-    return drape_halve(values[PARAM_DT_MIN], trial);
+    return drape_trial_failed(trial) || too_far(values, trial) ? drape_halve(values[PARAM_DT_MIN], trial)
+                                                               : DRAPE_ACCEPT;
 }
 
 const drape_controller_ops drape_controller_strain = {

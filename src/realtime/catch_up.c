@@ -4,6 +4,7 @@
 #include "base/rotation.h"
 #include "base/vec3.h"
 #include "colliders/colliders.h"
+#include "host/place.h"
 #include "model/sent.h"
 
 #include <math.h>

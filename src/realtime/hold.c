@@ -94,13 +94,13 @@ static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info
     return DRAPE_OK;
 }
 
-bool drape_sim_hold(drape_sim *sim, drape_status failure, drape_step_info *info, drape_status *stop)
+bool drape_hold(drape_sim *sim, drape_trial *trial, bool stopped, drape_status *error)
 {
     drape_step_info held;
     drape_state *next = &sim->states[sim->next];
     const drape_realtime_memory *m = sim->realtime;
-    const bool worn_out = *stop || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
-    const bool may_help = failure > 0 || failure == DRAPE_E_STEP_TOO_SMALL;
+    const bool worn_out = stopped || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
+    const bool may_help = trial->status >= 0 || trial->status == DRAPE_E_STEP_TOO_SMALL;
     if (!worn_out || !may_help || !m->active || sim->chosen.integrator->own_steps ||
         sim->model->contact.no_room == DRAPE_NO_ROOM_STOP)
         return false;
@@ -108,15 +108,13 @@ bool drape_sim_hold(drape_sim *sim, drape_status failure, drape_step_info *info,
     drape_system_end_step(sim->system);
     if (!status && drape_events_examine(sim, next, &status) != DRAPE_EVENTS_PASS)
         status = status ? status : DRAPE_RETRY_REJECTED;
-    if (status < 0)
-        *stop = status;
+    *error = status < 0 ? status : DRAPE_OK;
     if (status)
         return false;
     drape_log(sim->ctx, DRAPE_LOG_WARNING,
               "t=%.9g h=%.4g: no step can be made (%s), and the cloth is held where it is",
-              drape_sim_time(sim), held.h, info->reason);
-    *info = held;
-    *stop = DRAPE_OK;
+              drape_sim_time(sim), held.h, trial->info->reason);
+    *trial->info = held;
     sim->statistics.steps_held++;
     return true;
 }

@@ -11,9 +11,10 @@
 
 #include "realtime/realtime.h"
 
-/* After an attempt that failed, described by *info: makes such a step into the next state, if that is the
- * last resort and possible. Not where moving pins would make an element degenerate, nor over an event: then
- * the next attempt ends there. *stop as in drape_rescue_ops.failed. */
-bool drape_sim_hold(drape_sim *sim, drape_status failure, drape_step_info *info, drape_status *stop);
+/* After a trial that the controller did not accept (stopped: and is not to be made again): makes such a step
+ * into the next state, described by trial->info, if that is the last resort and possible. Not where moving
+ * pins would make an element degenerate, nor over an event: then the next attempt ends there. False if there
+ * is none; *error then has what ends the advance, or DRAPE_OK. */
+bool drape_hold(drape_sim *sim, drape_trial *trial, bool stopped, drape_status *error);
 
 #endif

@@ -87,19 +87,26 @@ static int32_t relax(drape_sim *sim, double t1, drape_status failure, bool stopp
     return *status ? 0 : added;
 }
 
-static drape_rescued failed(drape_sim *sim, double t1, drape_status failure, drape_step_info *info,
-                            drape_status *stop)
+static drape_verdict failed(drape_sim *sim, double t1, drape_trial *trial, drape_verdict verdict)
 {
     drape_realtime_memory *m = sim->realtime;
     drape_status status = DRAPE_OK;
-    m->relaxed_again = relax(sim, t1, failure, *stop != 0, &status) > 0;
-    if (status || m->relaxed_again)
-        *stop = status;
-    else if (drape_sim_hold(sim, failure ? failure : DRAPE_RETRY_REJECTED, info, stop))
-        return DRAPE_RESCUED_BY_STEP;
+    m->relaxed_again = relax(sim, t1, trial->status, verdict == DRAPE_STOP, &status) > 0;
+    if (!status && !m->relaxed_again && drape_hold(sim, trial, verdict == DRAPE_STOP, &status)) {
+        trial->h_next = sim->schedule.dt;
+        drape_schedule_cut(&sim->schedule, sim->states[sim->next].t);
+        return DRAPE_SUBSTITUTE;
+    }
     m->failed++;
     m->held_up++;
-    return m->relaxed_again ? DRAPE_RESCUED_AGAIN : DRAPE_RESCUED_NOT;
+    if (status) {
+        trial->stop = status;
+        return DRAPE_STOP;
+    }
+    if (!m->relaxed_again)
+        return verdict;
+    drape_schedule_repeat(&sim->schedule);
+    return DRAPE_REPEAT;
 }
 
 /* With a time budget, the steps of the schedule may be smaller than nominal ones. */

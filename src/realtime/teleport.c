@@ -8,7 +8,9 @@
 #include "base/rotation.h"
 #include "base/vec3.h"
 #include "realtime/realtime.h"
-#include "sim/attach.h"
+
+#include "host/place.h"
+#include "sim/rides.h"
 #include "sparse/project.h"
 
 #include <string.h>

@@ -2,6 +2,7 @@
  * the rules are written once. */
 #include "sim/choose.h"
 
+#include "base/def.h"
 #include "base/retired.h"
 
 #include <stdio.h>
@@ -141,6 +142,12 @@ static drape_status check_momenta(drape_context *ctx, const drape_model *model,
                              "the term \"%s\" has momentum, which is not stepped with supports that move",
                              moving_term(model));
     return DRAPE_OK;
+}
+
+void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
+{
+    const drape_sim_def defaults = {.struct_size = struct_size, .threads = 1};
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,

@@ -4,8 +4,8 @@
 #include "base/elementary.h"
 #include "model/support.h"
 #include "model/track.h"
-#include "sim/attach.h"
 #include "sim/rescue.h"
+#include "sim/rides.h"
 
 #include <string.h>
 
@@ -177,6 +177,14 @@ static drape_status go_on(drape_sim *to, drape_sim *from)
         status = copy_account(to, from);
     drape_free(to->ctx, before);
     return status;
+}
+
+void drape_sim_forget_past(drape_sim *sim)
+{
+    sim->before = sim->past[0] = sim->past[1] = -1;
+    memset(sim->scratch, 0, sizeof sim->scratch);
+    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_events_reset(sim);
 }
 
 drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,

@@ -6,14 +6,13 @@
 #ifndef DRAPE_SIM_RESCUE_H
 #define DRAPE_SIM_RESCUE_H
 
-#include "sim/place.h"
+#include "sim/sim.h"
 #include "sim/warnings.h"
 
-typedef enum drape_rescued {
-    DRAPE_RESCUED_NOT,
-    DRAPE_RESCUED_AGAIN,  /* the same step is worth another attempt */
-    DRAPE_RESCUED_BY_STEP /* another one, which is to be accepted, was made into the next state */
-} drape_rescued;
+/* Where a collider is sent; velocities may be NULL, and so may the rotation (3 x 3). */
+typedef struct drape_sent {
+    const double *displacement, *velocity, *rotation, *angular_velocity;
+} drape_sent;
 
 typedef struct drape_rescue_ops {
     /* ---- Of a sim that has asked for it: drape_sim.rescue ---- */
@@ -23,11 +22,10 @@ typedef struct drape_rescue_ops {
     void (*solved)(drape_sim *sim, const drape_step_info *info);
     /* Whether any step is better than none, however far from solved it is. */
     bool (*takes_any)(const drape_sim *sim);
-    /* An attempt has failed; status 0: by the controller alone. *stop: not to be tried again, because of this
-     * status; it is set to what ends the advance after all, 0: nothing. *info describes the attempt and, of
-     * another step, that. */
-    drape_rescued (*failed)(drape_sim *sim, double t1, drape_status status, drape_step_info *info,
-                            drape_status *stop);
+    /* The controller gave this verdict, RETRY or STOP, on an attempt at a step to t1. Returns it, or what
+     * becomes of the attempt instead: REPEAT; SUBSTITUTE, with another step in the next state, described by
+     * trial->info, and trial->h_next; STOP. */
+    drape_verdict (*failed)(drape_sim *sim, double t1, drape_trial *trial, drape_verdict verdict);
     /* A step was accepted. */
     void (*accepted)(drape_sim *sim);
     /* The next steps are those of an advance without a budget. */

@@ -164,6 +164,9 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
     return &sim->states[sim->now];
 }
 
+/* The bound on the residual that the integrator uses [N]; NaN: it has none. */
+double drape_sim_tolerance(const drape_sim *sim);
+
 /* The bound on the estimated error of a step [m]; NaN: the integrator estimates none. */
 double drape_sim_error_bound(const drape_sim *sim);
 
@@ -185,12 +188,20 @@ void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info
  * present state; `dissipated` and `numerical` are 0. */
 drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v);
 
+/* The status of forces that were read: a pending request to cancel the next advance is not an error of
+ * reading. Errors: DRAPE_E_MEMORY. */
+drape_status drape_sim_read_status(const drape_sim *sim);
+
 /* drape_sim_reactions at another point. Errors: DRAPE_E_MEMORY. */
 drape_status drape_sim_reactions_at(drape_sim *sim, const drape_point *point, double *forces);
 
 /* drape_sim_energy_density at other positions (node_count x 3), with the internal variables of the present
  * state. */
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
+
+/* What integrators, controllers and events remember of earlier steps is of another motion: they begin anew
+ * from the present state. */
+void drape_sim_forget_past(drape_sim *sim);
 
 /* Adds the energy that contact gained by becoming stiffer at the beginning of a step, which stays whether
  * or not the step is accepted. */

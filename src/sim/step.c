@@ -1,7 +1,7 @@
 /*
- * step.c: the driver. An advance is a loop of attempts, each a call of try_step: compute_next, check,
- * judge, accept or reject. A step is made in the state `next`: rejecting it discards that state, accepting it
- * exchanges `now` and `next`.
+ * step.c: the driver. An advance is a loop of attempts, each a call of try_step: compute_next makes a step
+ * into the state `next` and checks it; a verdict is found (control.h draws how); accept exchanges `now` and
+ * `next`, reject leaves `next` to be overwritten.
  */
 #include "base/clock.h"
 #include "base/finite.h"
@@ -129,21 +129,20 @@ static const drape_state *past_state(const drape_sim *sim, int k)
     return sim->past[k] >= 0 ? &sim->states[sim->past[k]] : NULL;
 }
 
-static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status status, drape_trial *trial)
+static drape_trial trial_of(drape_sim *sim, drape_step_info *info, drape_status status)
 {
-    *trial = (drape_trial){.model = sim->model,
-                           .past = {past_state(sim, 0), past_state(sim, 1)},
-                           .in = drape_sim_state(sim),
-                           .out = next_state(sim),
-                           .order = sim->chosen.integrator->order,
-                           .scratch = sim->scratch,
-                           .h = info->h,
-                           .dt = sim->schedule.dt,
-                           .integrator = sim->chosen.integrator,
-                           .integrator_state = sim->integrator,
-                           .info = info,
-                           .status = status};
-    return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
+    return (drape_trial){.model = sim->model,
+                         .past = {past_state(sim, 0), past_state(sim, 1)},
+                         .in = drape_sim_state(sim),
+                         .out = next_state(sim),
+                         .order = sim->chosen.integrator->order,
+                         .scratch = sim->scratch,
+                         .h = info->h,
+                         .dt = sim->schedule.dt,
+                         .integrator = sim->chosen.integrator,
+                         .integrator_state = sim->integrator,
+                         .info = info,
+                         .status = status};
 }
 
 /* ---- Accept and reject ---- */
@@ -259,24 +258,25 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     return !check(sim, info);
 }
 
-/* For an attempt that the controller accepted: whether it is made again, so that it ends at an event, or
- * given up, because an event acts on the present state. *stop: an event function failed. memory: of the
- * controller before it judged. */
-static bool must_repeat(drape_sim *sim, const double memory[2], drape_step_info *info, drape_status *stop)
+/* The verdict of events on a step that the controller accepted: STOP if an event function failed; REPEAT if
+ * the step is to end at an event, or one acts on the present state. memory: of the controller before it
+ * judged. */
+static drape_verdict ask_events(drape_sim *sim, const double memory[2], drape_trial *trial)
 {
     drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */
-    drape_event_verdict verdict = drape_events_examine(sim, next_state(sim), stop);
-    if (verdict == DRAPE_EVENTS_REPEAT && cut_on_dense_output(sim, info))
-        verdict = drape_events_examine(sim, next_state(sim), stop);
-    if (verdict == DRAPE_EVENTS_PASS)
-        return false;
-    *stop = *stop ? *stop : drape_system_status(sim->system);
+    drape_status failure = DRAPE_OK;
+    drape_event_verdict found = drape_events_examine(sim, next_state(sim), &failure);
+    if (found == DRAPE_EVENTS_REPEAT && cut_on_dense_output(sim, trial->info))
+        found = drape_events_examine(sim, next_state(sim), &failure);
+    if (found == DRAPE_EVENTS_PASS)
+        return DRAPE_ACCEPT;
+    trial->stop = failure ? failure : drape_system_status(sim->system);
     memcpy(sim->scratch, memory, sizeof sim->scratch);
     if (sim->chosen.integrator->own_steps) /* it has accepted the step already */
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    info->reason = drape_reason_name(DRAPE_REASON_EVENT);
-    reject(sim, info);
-    return true;
+    trial->info->reason = drape_reason_name(DRAPE_REASON_EVENT);
+    trial->status = DRAPE_RETRY_REJECTED;
+    return trial->stop ? DRAPE_STOP : DRAPE_REPEAT;
 }
 
 /* ---- Messages ---- */
@@ -372,58 +372,47 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 
 /* ---- One step, and an advance ---- */
 
-/* The description of an attempt for the observers. */
-static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
-                               bool accepted)
-{
-    return (drape_attempt){.index = sim->attempts++,
-                           .t = t,
-                           .h = info->h,
-                           .status = status,
-                           .reason = info->reason,
-                           .accepted = accepted,
-                           .iterations = info->iterations,
-                           .residual = info->residual,
-                           .tolerance = info->tolerance,
-                           .diagnostic = info->diagnostic,
-                           .error = info->error,
-                           .left = info->left};
-}
-
 /* Makes one attempt, from proposal to verdict. *stop: the negative status that ends the advance; 0:
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
     drape_step_info info = {
         .reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN, .left = NAN, .own = NAN};
-    drape_trial trial;
-    double t = drape_sim_state(sim)->t;
-    const double memory[2] = {sim->scratch[0], sim->scratch[1]};
-    drape_status status = compute_next(sim, t1, h, &info);
-    drape_verdict verdict = judge(sim, &info, status, &trial);
-    *stop = DRAPE_OK;
-    if (verdict == DRAPE_ACCEPT && must_repeat(sim, memory, &info, stop))
-        return record_of(sim, t, &info, DRAPE_RETRY_REJECTED, false);
-    *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
-    const drape_rescued rescued = verdict != DRAPE_ACCEPT && sim->rescue
-                                      ? sim->rescue->failed(sim, t1, status, &info, stop)
-                                      : DRAPE_RESCUED_NOT;
-    const bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT, /* by the controller alone */
-        accepted = verdict == DRAPE_ACCEPT || rescued == DRAPE_RESCUED_BY_STEP;
-    if (rescued == DRAPE_RESCUED_BY_STEP)
-        drape_schedule_cut(&sim->schedule, next_state(sim)->t);
+    const double t = drape_sim_state(sim)->t, memory[2] = {sim->scratch[0], sim->scratch[1]};
+    const drape_status status = compute_next(sim, t1, h, &info);
+    drape_trial trial = trial_of(sim, &info, status);
+    drape_verdict verdict = sim->chosen.controller->judge(sim->chosen.controller_values, &trial);
+    if (verdict == DRAPE_ACCEPT)
+        verdict = ask_events(sim, memory, &trial);
+    else if (sim->rescue)
+        verdict = sim->rescue->failed(sim, t1, &trial, verdict);
+    if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next)) {
+        trial.stop = DRAPE_E_STEP_TOO_SMALL;
+        verdict = DRAPE_STOP;
+    }
+    const bool accepted = verdict == DRAPE_ACCEPT || verdict == DRAPE_SUBSTITUTE;
     if (accepted) {
-        accept(sim, &info, rescued == DRAPE_RESCUED_BY_STEP ? sim->schedule.dt : trial.h_next);
+        accept(sim, &info, trial.h_next);
         drape_events_commit(sim);
     } else
         reject(sim, &info);
-    if (rescued == DRAPE_RESCUED_BY_STEP)
+    if (verdict == DRAPE_SUBSTITUTE)
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    else if (rescued == DRAPE_RESCUED_AGAIN)
-        drape_schedule_repeat(&sim->schedule);
-    else if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next))
-        *stop = DRAPE_E_STEP_TOO_SMALL;
-    return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, accepted);
+    *stop = verdict == DRAPE_STOP ? trial.stop : DRAPE_OK;
+    return (drape_attempt){.index = sim->attempts++,
+                           .t = t,
+                           .h = info.h,
+                           /* refused by the controller alone, an attempt has the status of a success */
+                           .status =
+                               trial.status || verdict == DRAPE_ACCEPT ? trial.status : DRAPE_RETRY_REJECTED,
+                           .reason = info.reason,
+                           .accepted = accepted,
+                           .iterations = info.iterations,
+                           .residual = info.residual,
+                           .tolerance = info.tolerance,
+                           .diagnostic = info.diagnostic,
+                           .error = info.error,
+                           .left = info.left};
 }
 
 /* Contact time so far, including queries outside steps such as energies for observers. */

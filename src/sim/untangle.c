@@ -12,7 +12,6 @@
 #include "contact/untangle.h"
 #include "geometry/intersect.h"
 #include "sim/inside.h"
-#include "sim/place.h"
 
 #include <stdio.h>
 #include <string.h>

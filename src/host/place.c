@@ -3,12 +3,12 @@
  * strained by it, so nothing is left to calm down. All is checked before anything changes. The new state is
  * built in the one that the next attempt would overwrite.
  */
-#include "sim/place.h"
+#include "host/place.h"
 
 #include "base/def.h"
 #include "base/rotation.h"
 #include "mesh/mesh.h"
-#include "sim/attach.h"
+#include "sim/rides.h"
 
 #include <math.h>
 #include <string.h>
@@ -148,14 +148,6 @@ static void place_motion(drape_sim *sim, const drape_place_list *cloths, const d
         if (has(colliders, c))
             drape_motion_place_collider(motion, c, &own);
     }
-}
-
-void drape_sim_forget_past(drape_sim *sim)
-{
-    sim->before = sim->past[0] = sim->past[1] = -1;
-    memset(sim->scratch, 0, sizeof sim->scratch);
-    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    drape_events_reset(sim);
 }
 
 drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,

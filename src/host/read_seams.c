@@ -1,4 +1,4 @@
-/* seams.c: what seams carry. */
+/* read_seams.c: what seams carry. */
 #include "base/vec3.h"
 #include "sim/sim.h"
 

@@ -1,4 +1,4 @@
-/* drag_spring.c: springs by which a host drags nodes. Setting them changes the energy of the present state;
+/* drag_springs.c: springs by which a host drags nodes. Setting them changes the energy of the present state;
  * the account counts this as work of the host, like a pin's. */
 #include "base/finite.h"
 #include "sim/sim.h"

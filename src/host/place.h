@@ -1,6 +1,6 @@
 /* place.h: cloth and colliders placed elsewhere by a rigid motion. */
-#ifndef DRAPE_SIM_PLACE_H
-#define DRAPE_SIM_PLACE_H
+#ifndef DRAPE_HOST_PLACE_H
+#define DRAPE_HOST_PLACE_H
 
 #include "sim/sim.h"
 
@@ -17,13 +17,5 @@ drape_status drape_sim_check_place(const drape_sim *sim, const drape_place_list 
 /* drape_sim_place of these parts, which exist. Errors: DRAPE_E_ARGUMENT, after which nothing has changed. */
 drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloths,
                                    const drape_place_list *colliders, const drape_placement *by, bool stop);
-
-/* What integrators and controllers remember of earlier steps is of another place. */
-void drape_sim_forget_past(drape_sim *sim);
-
-/* Where a collider is sent; velocities may be NULL, and so may the rotation (3 x 3). */
-typedef struct drape_sent {
-    const double *displacement, *velocity, *rotation, *angular_velocity;
-} drape_sent;
 
 #endif

@@ -1,5 +1,5 @@
-/* masses.c: nodes that get other masses while the sim runs. Integrators keep masses in many places, so the
- * sim is made anew for a model with these, beside the present one, as when pins change. */
+/* set_masses.c: nodes that get other masses while the sim runs. Integrators keep masses in many places, so
+ * the sim is made anew for a model with these, beside the present one, as when pins change. */
 #include "sim/sim.h"
 
 #include <string.h>
