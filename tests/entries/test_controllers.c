@@ -36,7 +36,7 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
                          .info = info,
                          .status = *status};
     drape_verdict verdict = ops->judge(values, &trial);
-    *status = trial.status;
+    *status = verdict == DRAPE_STOP ? trial.stop : trial.status; /* what ends the advance */
     if (verdict == DRAPE_RETRY)
         ck_assert(trial.h_next > 0 && trial.h_next < h && t + trial.h_next > t);
     if (verdict == DRAPE_ACCEPT && ops->own_steps)
