@@ -334,7 +334,7 @@ START_TEST(sim_defs_are_checked)
         const char *integrator, *controller, *key;
         double number;
         const char *text;
-        double dt, dt_min, frame_rate;
+        double dt, dt_min, frame_rate, teleport_speed;
         int threads;
         const char *says;
     } cases[] = {
@@ -351,6 +351,7 @@ START_TEST(sim_defs_are_checked)
         {.dt = INFINITY, .threads = 1, .says = "/integrator/dt"},
         {.dt_min = NAN, .threads = 1, .says = "/controller/dt_min"},
         {.frame_rate = -1, .threads = 1, .says = "frame_rate = -1"},
+        {.teleport_speed = -1, .threads = 1, .says = "teleport_speed = -1"},
         {.threads = 0, .says = "threads = 0; it is 1 to 256"},
         {.threads = 257, .says = "threads = 257"},
     };
@@ -368,6 +369,7 @@ START_TEST(sim_defs_are_checked)
         def.dt = cases[i].dt;
         def.dt_min = cases[i].dt_min;
         def.frame_rate = cases[i].frame_rate;
+        def.teleport_speed = cases[i].teleport_speed;
         def.threads = cases[i].threads;
         ck_assert_msg(drape_sim_create(ctx, model, &def, &sim) == DRAPE_E_ARGUMENT, "case %zu", i);
         ck_assert_ptr_null(sim);

@@ -426,49 +426,6 @@ END_TEST
 
 /* ---- Refused ---- */
 
-static drape_status try_attach(void *user, const drape_event *event)
-{
-    host *h = user;
-    const int32_t node = 12;
-    if (event->kind == DRAPE_EVENT_ATTEMPT) {
-        says(h, drape_sim_attach(h->sim, 0, 1, &node, NULL), DRAPE_E_ARGUMENT,
-             "an observer must not call it");
-        says(h, drape_sim_detach(h->sim, 1, &node), DRAPE_E_ARGUMENT, "an observer must not call it");
-    }
-    return DRAPE_OK;
-}
-
-START_TEST(refused)
-{
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be", "{'edge': 'top'}");
-    const int32_t none = 20, minus = -1, free_node = 12, pinned = 0, triangle = 0;
-    const drape_status e = DRAPE_E_ARGUMENT;
-    const uint64_t hash = drape_sim_hash(h.sim);
-    ck_assert_int_eq(drape_sim_attach(NULL, 0, 0, NULL, NULL), e);
-    ck_assert_int_eq(drape_sim_detach(NULL, 0, NULL), e);
-    ck_assert_int_eq(drape_sim_attached(NULL, 0), -1);
-    ck_assert_int_eq(drape_sim_attached(h.sim, 20), -1);
-    says(&h, drape_sim_attach(h.sim, 2, 1, &pinned, NULL), e,
-         "drape_sim_attach: collider 2; the model has 2");
-    says(&h, drape_sim_attach(h.sim, -1, 1, &pinned, NULL), e, "collider -1; the model has 2");
-    says(&h, drape_sim_attach(h.sim, 0, 1, &none, NULL), e, "node 20; there are 0 to 19");
-    says(&h, drape_sim_attach(h.sim, 0, 1, &minus, NULL), e, "node -1; there are 0 to 19");
-    says(&h, drape_sim_attach(h.sim, 0, 1, NULL, NULL), e, "1 nodes, but no list of them");
-    says(&h, drape_sim_attach(h.sim, 0, -1, &pinned, NULL), e, "-1 nodes");
-    says(&h, drape_sim_attach(h.sim, 0, 1, &pinned, &triangle), e, "body is a box, which is rigid");
-    says(&h, drape_sim_detach(h.sim, 1, &free_node), e, "no collider carries node 12, which is free");
-    says(&h, drape_sim_detach(h.sim, 1, &pinned), e, "no collider carries node 0, which is pinned otherwise");
-    says(&h, drape_sim_detach(h.sim, 1, &none), e, "node 20; there are 0 to 19");
-    good(&h, drape_sim_attach(h.sim, 0, 0, NULL, NULL));
-    good(&h, drape_sim_detach(h.sim, 0, NULL));
-    ck_assert(drape_sim_hash(h.sim) == hash);
-    good(&h, drape_sim_observe(h.sim, try_attach, &h));
-    good(&h, drape_sim_advance(h.sim, FRAME));
-    close_scene(&h, &memory);
-}
-END_TEST
-
 /* Each allocation fails once: then nothing has changed. */
 START_TEST(without_memory_nothing_changes)
 {
@@ -504,4 +461,4 @@ SUITE("attach", nodes_are_attached_and_detached, pins_of_a_moving_body_begin_wit
       a_body_begins_to_turn_without_weight, a_pin_that_is_sent_leaves_its_body,
       checkpoints_keep_what_is_attached, placed_cloth_rides_on, a_body_that_is_sent_far_takes_its_cloth_along,
       changed_colliders_carry_on, changed_pins_ride_from_where_they_are, a_state_has_its_pins_on_the_body,
-      refused, without_memory_nothing_changes)
+      without_memory_nothing_changes)

@@ -546,19 +546,6 @@ END_TEST
 
 /* ---- Refusals ---- */
 
-static drape_status change_within(void *user, const drape_event *event)
-{
-    changing *c = user;
-    const int32_t node = 0;
-    (void)event;
-    says(&c->h, drape_sim_change(c->h.sim, c->scene), DRAPE_E_ARGUMENT, "an observer must not call it");
-    says(&c->h, drape_sim_change_model(c->h.sim, c->h.model), DRAPE_E_ARGUMENT,
-         "an observer must not call it");
-    says(&c->h, drape_sim_pin(c->h.sim, 1, &node), DRAPE_E_ARGUMENT, "an observer must not call it");
-    says(&c->h, drape_sim_unpin(c->h.sim, 1, &node), DRAPE_E_ARGUMENT, "an observer must not call it");
-    return DRAPE_OK;
-}
-
 START_TEST(refusals_leave_the_sim_as_it_was)
 {
     static const char *const wrong[][3] = {
@@ -583,18 +570,6 @@ START_TEST(refusals_leave_the_sim_as_it_was)
         advance(&c, FRAME);
         close_changing(&c, &memory);
     }
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", on_ball);
-    const int32_t none = 20;
-    says(&c.h, drape_sim_change(c.h.sim, NULL), DRAPE_E_ARGUMENT, "the scene is NULL");
-    says(&c.h, drape_sim_change_model(c.h.sim, NULL), DRAPE_E_ARGUMENT, "the model is NULL");
-    says(&c.h, drape_sim_pin(c.h.sim, 1, &none), DRAPE_E_ARGUMENT, "node 20; there are 0 to 19");
-    says(&c.h, drape_sim_unpin(c.h.sim, 1, NULL), DRAPE_E_ARGUMENT, "no list of them");
-    ck_assert_int_eq(drape_sim_change(NULL, c.scene), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_sim_pin(NULL, 0, NULL), DRAPE_E_ARGUMENT);
-    good(&c.h, drape_sim_observe(c.h.sim, change_within, &c));
-    advance(&c, FRAME);
-    close_changing(&c, &memory);
 }
 END_TEST
 

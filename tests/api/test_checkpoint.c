@@ -119,45 +119,4 @@ typedef struct worker {
     uint64_t hash;
 } worker;
 
-static void *go_on(void *user)
-{
-    worker *w = user;
-    drape_context *ctx = NULL;
-    drape_sim *sim = NULL;
-    if (drape_context_create(NULL, &ctx) == DRAPE_OK &&
-        drape_sim_create(ctx, w->model, NULL, &sim) == DRAPE_OK &&
-        drape_sim_restore_from(sim, w->from->data, w->from->size) == DRAPE_OK &&
-        drape_sim_advance(sim, 0.4) == DRAPE_OK)
-        w->hash = drape_sim_hash(sim);
-    drape_sim_destroy(&sim);
-    drape_context_destroy(&ctx);
-    return NULL;
-}
-
-START_TEST(threads_are_restored_beside_each_other)
-{
-    drape_context *ctx = make_context();
-    drape_model *model = make_model(ctx, "be");
-    drape_sim *sim = make_sim(ctx, model, 1);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
-    bytes here = bytes_save(sim);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.4), DRAPE_OK);
-    worker workers[4];
-    pthread_t threads[4];
-    for (int k = 0; k < 4; k++) {
-        workers[k] = (worker){.model = model, .from = &here};
-        ck_assert_int_eq(pthread_create(&threads[k], NULL, go_on, &workers[k]), 0);
-    }
-    for (int k = 0; k < 4; k++) {
-        ck_assert_int_eq(pthread_join(threads[k], NULL), 0);
-        ck_assert_uint_eq(workers[k].hash, drape_sim_hash(sim));
-    }
-    free(here.data);
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
-}
-END_TEST
-
-SUITE("api/checkpoint", a_file_is_taken_by_another_sim, a_sim_is_taken_back,
-      threads_are_restored_beside_each_other)
+SUITE("api/checkpoint", a_file_is_taken_by_another_sim, a_sim_is_taken_back)

@@ -874,61 +874,6 @@ START_TEST(a_host_needs_no_memory)
 }
 END_TEST
 
-/* Each refusal says what would be right, and changes nothing. */
-START_TEST(wrong_arguments_are_refused)
-{
-    failing_allocator memory = {0};
-    char ball[256];
-    snprintf(ball, sizeof ball, BALL, "");
-    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}", "", ball);
-    const double zero[60] = {0}, far[3] = {0, 2e9, 0}, none[3] = {0, 0, NAN};
-    const int32_t pin = 0, two[2] = {0, 7}, out = 20, under = -1;
-    const drape_status e = DRAPE_E_ARGUMENT;
-    double bad[60] = {0}, force[3];
-    bad[59] = INFINITY;
-    good(&h, drape_sim_advance(h.sim, FRAME));
-    uint64_t before = drape_sim_hash(h.sim);
-    says(&h, drape_sim_move_pins(h.sim, 1, &out, 1, zero, NULL), e, "node 20; there are 0 to 19");
-    says(&h, drape_sim_move_pins(h.sim, 1, &under, 1, zero, NULL), e, "node -1");
-    says(&h, drape_sim_move_pins(h.sim, 2, two, 1, zero, NULL), e, "node 7 is free");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 0, zero, NULL), e, "seconds = 0");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, NAN, zero, NULL), e, "seconds = nan");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1e-300, zero, NULL), e, "seconds = 1e-300");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, far, NULL), e, "within 1e+09");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, none, NULL), e, "node 0");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, zero, none), e, "node 0");
-    says(&h, drape_sim_move_pins(h.sim, -1, &pin, 1, zero, NULL), e, "-1 nodes");
-    says(&h, drape_sim_move_pins(h.sim, 1, NULL, 1, zero, NULL), e, "no list");
-    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, NULL, NULL), e, "no list");
-    good(&h, drape_sim_move_pins(h.sim, 0, NULL, 1, NULL, NULL));
-    says(&h, drape_sim_move_collider(h.sim, 1, 1, zero, NULL), e, "collider 1; the model has 1");
-    says(&h, drape_sim_move_collider(h.sim, 0, -1, zero, NULL), e, "seconds = -1");
-    says(&h, drape_sim_move_collider(h.sim, 0, 1, none, NULL), e, "displacement");
-    says(&h, drape_sim_move_collider(h.sim, 0, 1, NULL, NULL), e, "displacement");
-    says(&h, drape_sim_push(h.sim, bad), e, "the force on node");
-    says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term that feels the wind");
-    says(&h, drape_sim_reactions(h.sim, NULL), e, "the array is NULL");
-    says(&h, drape_sim_contact_forces(h.sim, NULL), e, "the array is NULL");
-    says(&h, drape_sim_collider_force(h.sim, 0, NULL), e, "the array is NULL");
-    says(&h, drape_sim_collider_force(h.sim, 3, force), e, "collider 3");
-    ck_assert_str_eq(drape_sim_collider(h.sim, 3).name, "");
-    ck_assert_uint_eq(drape_sim_hash(h.sim), before);
-    ck_assert_int_eq(drape_sim_move_pins(NULL, 0, NULL, 1, NULL, NULL), e);
-    ck_assert_int_eq(drape_sim_move_collider(NULL, 0, 1, zero, NULL), e);
-    ck_assert_int_eq(drape_sim_push(NULL, NULL), e);
-    ck_assert_int_eq(drape_sim_set_wind(NULL, NULL, NULL), e);
-    ck_assert_int_eq(drape_sim_reactions(NULL, bad), e);
-    ck_assert_int_eq(drape_sim_contact_forces(NULL, bad), e);
-    ck_assert_int_eq(drape_sim_collider_force(NULL, 0, force), e);
-    close_scene(&h, &memory);
-
-    h = open_scene(&memory, SHEET, "", "", "'method': 'verlet'", ball);
-    says(&h, drape_sim_contact_forces(h.sim, bad), e, "resolves contact by moving nodes");
-    says(&h, drape_sim_collider_force(h.sim, 0, force), e, "no contact force");
-    close_scene(&h, &memory);
-}
-END_TEST
-
 SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocities_make_a_motion_smooth,
       a_state_takes_moved_pins_along, a_collider_goes_where_it_is_sent, reactions_carry_the_weight,
       observers_read_forces, a_push_does_its_work, every_integrator_is_pushed,
@@ -936,4 +881,4 @@ SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocit
       a_steady_wind_is_that_of_the_term, a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on,
       a_step_can_be_cancelled, a_wind_changes_nothing, a_signal_and_a_thread_can_cancel,
       normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves, hosts_in_threads_share_a_model,
-      a_host_needs_no_memory, wrong_arguments_are_refused)
+      a_host_needs_no_memory)

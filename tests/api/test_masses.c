@@ -267,37 +267,6 @@ START_TEST(masses_and_pins_go_together)
 }
 END_TEST
 
-static drape_status set_within(void *user, const drape_event *event)
-{
-    const host *h = user;
-    const int32_t node = 0;
-    const double mass = 1;
-    says(h, drape_sim_set_masses(event->sim, 1, &node, &mass), DRAPE_E_ARGUMENT,
-         "an observer must not call it");
-    return DRAPE_OK;
-}
-
-START_TEST(masses_that_are_refused)
-{
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, ON_BALL, "");
-    const int32_t nodes[] = {3, 20};
-    const double masses[] = {0.1, 0.1}, wrong[] = {0, -1, NAN, INFINITY, 2e12};
-    const drape_model *model = drape_sim_model(h.sim);
-    says(&h, drape_sim_set_masses(h.sim, 2, nodes, masses), DRAPE_E_ARGUMENT, "node 20; there are 0 to 19");
-    says(&h, drape_sim_set_masses(h.sim, 2, NULL, masses), DRAPE_E_ARGUMENT, "no list of them");
-    says(&h, drape_sim_set_masses(h.sim, -1, nodes, masses), DRAPE_E_ARGUMENT, "no list of them");
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
-        says(&h, drape_sim_set_masses(h.sim, 1, nodes, &wrong[i]), DRAPE_E_ARGUMENT, "mass of node 3 = ");
-    good(&h, drape_sim_set_masses(h.sim, 0, NULL, NULL));
-    ck_assert_int_eq(drape_sim_set_masses(NULL, 0, NULL, NULL), DRAPE_E_ARGUMENT);
-    ck_assert_ptr_eq(drape_sim_model(h.sim), model);
-    good(&h, drape_sim_observe(h.sim, set_within, &h));
-    advance(&h, FRAME);
-    close_scene(&h, &memory);
-}
-END_TEST
-
 /* Each allocation fails once: the sim is as it was, nothing leaks, and then the masses change. */
 START_TEST(masses_without_memory)
 {
@@ -324,4 +293,4 @@ END_TEST
 
 SUITE("masses", masses_are_added_and_replaced, masses_from_structs, a_strip_carries_its_weights,
       the_period_is_that_of_the_masses, a_call_does_what_a_scene_does, velocities_stay_and_momentum_follows,
-      masses_and_pins_go_together, masses_that_are_refused, masses_without_memory)
+      masses_and_pins_go_together, masses_without_memory)

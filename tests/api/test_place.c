@@ -519,50 +519,6 @@ END_TEST
 
 /* ---- Refusals ---- */
 
-START_TEST(wrong_placements_are_refused)
-{
-    failing_allocator memory = {0};
-    host h = several(&memory);
-    const drape_status e = DRAPE_E_ARGUMENT;
-    const int32_t none = 2;
-    const uint64_t before = drape_sim_hash(h.sim);
-    drape_place_def def = place_def();
-    drape_sim_def sim;
-    ck_assert_int_eq(drape_sim_place(NULL, &def), e);
-    says(&h, drape_sim_place(h.sim, NULL), e, "the def is NULL");
-    for (size_t i = 0; i < 4; i++) { /* not initialised, only its size, a member short, too long */
-        def.struct_size = (const size_t[]){0, 8, sizeof def - 8, sizeof def + 8}[i];
-        says(&h, drape_sim_place(h.sim, &def), DRAPE_E_VERSION, "drape_place_def_init");
-    }
-    def = place_def();
-    def.rotate[3] = 10;
-    says(&h, drape_sim_place(h.sim, &def), e, "axis");
-    def = place_def();
-    def.translate[1] = NAN;
-    says(&h, drape_sim_place(h.sim, &def), e, "must be finite");
-    def.translate[1] = 1e9;
-    good(&h, drape_sim_place(h.sim, &(drape_place_def){.struct_size = sizeof def})); /* of nothing */
-    def.translate[1] = 0, def.translate[0] = 1e9;
-    def.collider_count = 0;
-    says(&h, drape_sim_place(h.sim, &def), e, "would be beyond 1e+09 m");
-    def = place_def();
-    def.cloth_count = 1;
-    says(&h, drape_sim_place(h.sim, &def), e, "no list of them");
-    def.cloths = &none;
-    says(&h, drape_sim_place(h.sim, &def), e, "cloth 2; the model has 2");
-    def = place_def();
-    def.collider_count = 1;
-    def.colliders = &(int32_t){-1};
-    says(&h, drape_sim_place(h.sim, &def), e, "collider -1; the model has 4");
-    ck_assert_uint_eq(drape_sim_hash(h.sim), before);
-    drape_sim_def_init(&sim, sizeof sim);
-    sim.teleport_speed = -1;
-    drape_sim_destroy(&h.sim);
-    says(&h, drape_sim_create(h.ctx, h.model, &sim, &h.sim), e, "teleport_speed = -1");
-    close_scene(&h, &memory);
-}
-END_TEST
-
 /* Two cloths of 9 nodes each, with the pins 0 and 1. The first is sent 100 m away, the second so far that its
  * nodes would be beyond the limit although the pin is not. Colliders are sent beyond it by what they would
  * have covered at their own velocity. */
@@ -623,4 +579,4 @@ SUITE("place", a_placed_sim_goes_on_as_before, a_scene_far_away_moves_alike, any
       only_what_is_chosen_is_placed, colliders_turn, cloth_placed_into_a_collider_comes_out,
       forces_of_placed_cloth_keep_the_account, a_checkpoint_keeps_placements,
       pins_that_are_sent_far_take_their_cloth_along, colliders_that_are_sent_far_are_there,
-      a_free_rotation_is_not_made, wrong_placements_are_refused, what_is_sent_wrongly_changes_nothing)
+      a_free_rotation_is_not_made, what_is_sent_wrongly_changes_nothing)

@@ -235,32 +235,5 @@ START_TEST(what_turns_too_fast_is_placed)
 }
 END_TEST
 
-/* Lengths that rounding in float cannot explain; within them the rotation is that of the direction. */
-START_TEST(a_quaternion_has_length_1)
-{
-    failing_allocator memory = {0};
-    turned t = open_turned(&memory, "", 0);
-    static const double lengths[] = {0, 0.1, 0.98, 1.02, 1.5, 2, 10, 1e200, NAN};
-    const double here[3] = {0};
-    double got[4];
-    for (size_t i = 0; i < sizeof lengths / sizeof *lengths; i++) {
-        const double q[4] = {0.8 * lengths[i], 0, 0.6 * lengths[i], 0};
-        says(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, FRAME, here, q, NULL, NULL), DRAPE_E_ARGUMENT,
-             "it is a quaternion w x y z of length 0.99 to 1.01");
-    }
-    says(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, FRAME, here, (double[]){1.6, 0, 1.2, 0}, NULL, NULL),
-         DRAPE_E_ARGUMENT, "the rotation has length 2;");
-    says(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, FRAME, here, NULL, NULL, NULL), DRAPE_E_ARGUMENT,
-         "the rotation is NULL");
-    const double q[4] = {0.8 * 1.0099, 0, 0.6 * 1.0099, 0};
-    good(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, FRAME, here, q, NULL, NULL));
-    advance(&t, FRAME);
-    drape_sim_collider_rotation(t.h.sim, 0, got, NULL, NULL);
-    ck_assert_double_eq_tol(got[0], 0.8, 1e-14);
-    close_turned(&t, &memory);
-}
-END_TEST
-
 SUITE("poses", a_turning_body_stays_where_it_is, a_sent_body_arrives_where_it_was_sent,
-      a_middle_moves_with_its_shape, a_turn_within_a_moment_is_refused, what_turns_too_fast_is_placed,
-      a_quaternion_has_length_1)
+      a_middle_moves_with_its_shape, a_turn_within_a_moment_is_refused, what_turns_too_fast_is_placed)
