@@ -1,165 +1,24 @@
 /*
- * test_least_gap.c: cloth that is pressed against something. No pair of pieces comes nearer than the
- * least gap, so nothing passes through anything, in any accepted state and on the straight path between
- * two, whatever presses; a run that cannot keep this stops and names the pair. Crossings are counted
- * here, without the library: an edge passes through a triangle if its ends are on different sides of the
- * plane and it passes all three sides of the triangle in the same sense. Determinants are computed with
- * 64 bits: their rounding error is far below those of gaps of 1e-3 activation distances.
+ * test_least_gap.c: how contact keeps its least gap: it becomes stiffer where gaps cannot shrink, pushes out
+ * what begins inside, and rounding does not add up. That nothing passes through anything, whatever presses,
+ * is tested by physics/press.
  */
 #include "colliders/colliders.h"
 #include "contact/barrier.h"
 #include "contact/parts.h"
-#include "support/methods.h"
-#include "support/sample.h"
+#include "support/bytes.h"
+#include "support/crossings.h"
 #include "support/scene.h"
 
 #include <stdlib.h>
 #include <unistd.h>
-
-/* ---- Crossings ---- */
-
-static long double side(const double *a, const double *b, const double *c, const double *d)
-{
-    long double u[3], v[3], w[3];
-    for (int k = 0; k < 3; k++) {
-        u[k] = (long double)b[k] - a[k];
-        v[k] = (long double)c[k] - a[k];
-        w[k] = (long double)d[k] - a[k];
-    }
-    return u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
-           u[2] * (v[0] * w[1] - v[1] * w[0]);
-}
-
-static bool pierces(const double *p, const double *q, const double *a, const double *b, const double *c)
-{
-    for (int k = 0; k < 3; k++)
-        if (fmax(p[k], q[k]) < fmin(fmin(a[k], b[k]), c[k]) ||
-            fmin(p[k], q[k]) > fmax(fmax(a[k], b[k]), c[k]))
-            return false;
-    const long double over = side(a, b, c, p), under = side(a, b, c, q);
-    if (over == 0 || under == 0 || (over > 0) == (under > 0))
-        return false;
-    const long double s[3] = {side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)};
-    return (s[0] > 0 && s[1] > 0 && s[2] > 0) || (s[0] < 0 && s[1] < 0 && s[2] < 0);
-}
-
-/* Edges and triangles of cloth (own) or of a collider, with the positions of their points. */
-typedef struct surface {
-    const double *x;
-    const int32_t *edge, *triangle;
-    int32_t edges, triangles;
-} surface;
-
-static int crossings(const surface *a, const surface *b)
-{
-    int count = 0;
-    for (int32_t e = 0; e < a->edges; e++)
-        for (int32_t f = 0; f < b->triangles; f++) {
-            const int32_t *n = a->edge + 2 * (size_t)e, *t = b->triangle + 3 * (size_t)f;
-            bool shared = false;
-            for (int i = 0; i < 6 && a->x == b->x; i++)
-                shared = shared || n[i / 3] == t[i % 3];
-            count +=
-                !shared && pierces(a->x + 3 * (size_t)n[0], a->x + 3 * (size_t)n[1], b->x + 3 * (size_t)t[0],
-                                   b->x + 3 * (size_t)t[1], b->x + 3 * (size_t)t[2]);
-        }
-    return count;
-}
-
-static int crossings_at(const drape_model *m, const double *x, double t)
-{
-    const surface cloth = {x, m->edge, m->triangle, m->edge_count, m->triangle_count};
-    int count = m->contact.self ? crossings(&cloth, &cloth) : 0;
-    for (int32_t c = 0; c < m->collider_count; c++) {
-        const drape_collider_shape *shape = &m->colliders[c].shape;
-        const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], t);
-        double corner[3 * 64];
-        ck_assert_int_le(shape->point_count, 64);
-        for (int32_t i = 0; i < shape->point_count; i++)
-            drape_collider_point(&m->colliders[c], &pose, i, corner + 3 * i);
-        const surface body = {corner, shape->segment, shape->triangle, shape->segment_count,
-                              shape->triangle_count};
-        count += crossings(&cloth, &body) + crossings(&body, &cloth);
-    }
-    return count;
-}
-
-/* ---- Watching ---- */
-
-#define BETWEEN 4 /* states looked at between one accepted state and the next */
-
-typedef struct watch {
-    drape_sim *sim;
-    double *last, *x, t; /* the last accepted state */
-    int crossings, frames_crossed;
-    long steps, rejected;
-    double least_gap; /* [m] */
-} watch;
-
-static drape_status look(void *user, const drape_event *event)
-{
-    watch *w = user;
-    const drape_model *m = w->sim->model;
-    const drape_state *now = drape_sim_state(w->sim);
-    const size_t n = 3 * (size_t)m->node_count;
-    if (event->kind == DRAPE_EVENT_FRAME) {
-        w->frames_crossed += crossings_at(m, event->positions, event->time) > 0;
-        return DRAPE_OK;
-    }
-    w->rejected += !event->attempt->accepted;
-    if (!event->attempt->accepted)
-        return DRAPE_OK;
-    for (int k = 1; k <= BETWEEN; k++) {
-        const double s = (double)k / BETWEEN;
-        for (size_t i = 0; i < n; i++)
-            w->x[i] = k < BETWEEN ? w->last[i] + s * (now->x[i] - w->last[i]) : now->x[i];
-        w->crossings += crossings_at(m, w->x, w->t + s * (now->t - w->t));
-    }
-    double gap;
-    drape_system_contact_energy(w->sim->system, &(drape_point){.x = now->x, .v = now->v, .t = now->t});
-    drape_contact_active(drape_system_contact(w->sim->system), &gap);
-    w->least_gap = fmin(w->least_gap, gap);
-    memcpy(w->last, now->x, n * sizeof *w->last);
-    w->t = now->t;
-    w->steps++;
-    return DRAPE_OK;
-}
-
-/* Runs to the end, or until it stops with a message that names a pair. Returns whether it reached the end. */
-static bool press(scene *s, double until, const char *what)
-{
-    const size_t n = 3 * (size_t)s->model->node_count;
-    watch w = {.sim = s->sim,
-               .last = malloc(n * sizeof(double)),
-               .x = malloc(n * sizeof(double)),
-               .least_gap = INFINITY};
-    ck_assert(w.last && w.x);
-    memcpy(w.last, drape_sim_state(s->sim)->x, n * sizeof *w.last);
-    ck_assert_int_eq(drape_sim_observe(s->sim, look, &w), DRAPE_OK);
-    const drape_status status = drape_sim_advance(s->sim, until);
-    const char *message = drape_context_message(s->ctx);
-    printf("# %s: t = %.3g of %g s, %ld steps, %ld rejected, least gap %.2g m, %d crossings, %d frames "
-           "crossed%s%s\n",
-           what, drape_sim_state(s->sim)->t, until, w.steps, w.rejected, w.least_gap, w.crossings,
-           w.frames_crossed, status ? ": " : "", status ? message : "");
-    ck_assert_msg(w.crossings == 0, "%s: %d crossings", what, w.crossings);
-    ck_assert_msg(w.frames_crossed == 0, "%s: %d frames with crossings", what, w.frames_crossed);
-    if (status) {
-        ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
-        ck_assert_msg(strstr(message, "collider") || strstr(message, "self_contact"), "%s: %s", what,
-                      message);
-    }
-    free(w.last);
-    free(w.x);
-    return status == DRAPE_OK;
-}
 
 static const char tetrahedron[] = "v 0.3 -0.5 0\nv -0.15 -0.5 0.26\nv -0.15 -0.5 -0.26\nv 0.013 0 0.017\n"
                                   "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
 
 static void enter_folder(void)
 {
-    char folder[] = "/tmp/drape-press-XXXXXX";
+    char folder[] = "/tmp/drape-gap-XXXXXX";
     ck_assert_ptr_nonnull(mkdtemp(folder));
     ck_assert_int_eq(chdir(folder), 0);
     FILE *file = fopen("tip.obj", "w");
@@ -186,102 +45,6 @@ static const char *method_of(const char *name, double dt)
     snprintf(text, sizeof text, "'integrator': {'method': '%s', 'dt': %g}", name, dt);
     return text;
 }
-
-/* A sheet with 4 x 4 squares, from 3e4 to 1e6 N/m, two sides of which are pulled down over a tip. */
-START_TEST(over_a_tip)
-{
-    const double membranes[] = {3e4, 1e6};
-    enter_folder();
-    for (size_t k = 0; k < 2 * METHODS; k++) {
-        char what[100];
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
-            "'height': 0.4, 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
-            "4, 20, 21, "
-            "22, 23, 24], 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
-            "]}], 'colliders': [{'type': 'mesh', 'file': 'tip.obj'}],"
-            " 'contact': {'distance': 4e-3}, %s, 'duration': 1, 'frame_rate': 100}",
-            membranes[k / METHODS] / 1e-3, method_of(methods[k % METHODS], 0.01));
-        snprintf(what, sizeof what, "over a tip, %g N/m, %s", membranes[k / METHODS], methods[k % METHODS]);
-        press(&s, 1, what);
-        scene_close(&s);
-    }
-    leave_folder();
-}
-END_TEST
-
-/* A strip whose ends are pulled down over another one, which is held at its ends. */
-START_TEST(strip_across_strip)
-{
-    for (size_t k = 0; k < 2 * METHODS; k++) {
-        const double membrane = k < METHODS ? 1e3 : 1e5;
-        if (!in_sample(k / METHODS, k % METHODS, 2))
-            continue;
-        char what[100];
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 3, 'width': 0.4, "
-            "'height': 0.08,"
-            " 'transform': {'translate': [-0.2, 0, 0.04]}}, 'pins': [{'nodes': [0, 8, 9, 17, 18, "
-            "26]}], " MATERIAL ", " TERMS
-            "]}, {'mesh': {'grid': 'square', 'columns': 3, 'rows': 9, 'width': 0.08, 'height': 0.4,"
-            " 'transform': {'translate': [-0.037, 0.012, 0.203]}}, 'pins': [{'nodes': [0, 1, 2, 24, 25, 26],"
-            " 'track': [[0, [0,0,0]], [1, [0,-0.1,0]]]}], " MATERIAL ", " TERMS
-            "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 1, "
-            "'frame_rate': 30}",
-            membrane / 1e-3, membrane / 1e-3, method_of(methods[k % METHODS], 0.01));
-        snprintf(what, sizeof what, "strip across strip, %g N/m, %s", membrane, methods[k % METHODS]);
-        press(&s, 1, what);
-        scene_close(&s);
-    }
-}
-END_TEST
-
-/* A loose sheet that a wind of 30 m/s blows onto one that is held at its corners. */
-START_TEST(blown)
-{
-    for (size_t k = 0; k < METHODS; k++) {
-        if (!in_sample(0, k, 2)) /* the tip and the strips have all methods */
-            continue;
-        char what[100];
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, "
-            "'height': 0.3,"
-            " 'orientation': 'vertical'}, 'pins': [{'nodes': [0, 4, 20, 24]}], " MATERIAL ", " TERMS
-            "]}, {'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.3, 'height': 0.3,"
-            " 'orientation': 'vertical', 'transform': {'translate': [0.013, 0.017, 0.03]}}, " MATERIAL
-            ", " TERMS ", {'type': 'drag.wind', 'wind': [0, 0, -30]}]}],"
-            " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, %s, 'duration': 0.15, "
-            "'frame_rate': 60}",
-            1e6, 1e6, method_of(methods[k], 0.005));
-        snprintf(what, sizeof what, "blown, %s", methods[k]);
-        press(&s, 0.15, what);
-        scene_close(&s);
-    }
-}
-END_TEST
-
-/* Two boards that close upon a sheet completely: nothing can yield, so every method stops and names a
- * pair. */
-START_TEST(between_two_boards)
-{
-    for (size_t k = 0; k < METHODS; k++) {
-        char what[100];
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.2, "
-            "'height': 0.2,"
-            " 'transform': {'translate': [-0.1, 0.005, 0.1]}}, " MATERIAL ", " TERMS "]}], 'colliders': ["
-            " {'type': 'box', 'center': [0, -0.1, 0], 'size': [0.5, 0.2, 0.5]},"
-            " {'type': 'box', 'center': [0, 0.11, 0], 'size': [0.5, 0.2, 0.5], 'track': [[0, [0,0,0]], [0.2, "
-            "[0,-0.01,0]]]}],"
-            " 'contact': {'distance': 4e-3}, 'gravity': [0, 0, 0], %s, 'duration': 0.2, 'frame_rate': 100}",
-            1e6, method_of(methods[k], 0.01));
-        snprintf(what, sizeof what, "between two boards, %s", methods[k]);
-        ck_assert(!press(&s, 0.2, what));
-        ck_assert_double_lt(drape_sim_state(s.sim)->t, 0.2);
-        scene_close(&s);
-    }
-}
-END_TEST
 
 /* Contact becomes stiffer while the sheet is pulled over the tip. The energy which that adds to present
  * contacts is counted as work: the numerical dissipation of backward Euler never falls by more than a
@@ -351,20 +114,6 @@ START_TEST(what_begins_inside_is_pushed_out_gently)
 }
 END_TEST
 
-typedef struct memory {
-    char bytes[1 << 20];
-    size_t size;
-} memory;
-
-static drape_status keep(void *user, const void *bytes, size_t size)
-{
-    memory *m = user;
-    ck_assert_uint_le(m->size + size, sizeof m->bytes);
-    memcpy(m->bytes + m->size, bytes, size);
-    m->size += size;
-    return DRAPE_OK;
-}
-
 #define ABOVE_A_BOX                                                                                          \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, 'height': "   \
     "0.1, 'transform': {'translate': [-0.05, 0.01, 0.05]}}, " MATERIAL ", 'terms': ['stretch.edge']}], "     \
@@ -428,7 +177,6 @@ END_TEST
  * than the scene says, and while cloth is inside. */
 START_TEST(a_checkpoint_keeps_it)
 {
-    static memory saved;
     enter_folder();
     for (int inside = 0; inside < 2; inside++) {
         uint64_t hash[2];
@@ -446,9 +194,9 @@ START_TEST(a_checkpoint_keeps_it)
         scene_advance(&s[0], half);
         const struct drape_contact *contact = drape_system_contact(s[0].sim->system);
         ck_assert(inside ? contact->inside.count > 0 : contact->press.factor > 1);
-        saved.size = 0;
-        ck_assert_int_eq(drape_sim_save_to(s[0].sim, keep, &saved), DRAPE_OK);
-        ck_assert_int_eq(drape_sim_restore_from(s[1].sim, saved.bytes, saved.size), DRAPE_OK);
+        bytes saved = bytes_save(s[0].sim);
+        ck_assert_int_eq(drape_sim_restore_from(s[1].sim, saved.data, saved.size), DRAPE_OK);
+        free(saved.data);
         for (int k = 0; k < 2; k++) {
             scene_advance(&s[k], end);
             hash[k] = drape_sim_hash(s[k].sim);
@@ -517,14 +265,15 @@ START_TEST(wrung)
     enter_folder();
     write_tube();
     for (int k = 0; k < 2; k++) {
-        char what[100];
+        crossings_run run = {0};
         scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'file': 'tube.obj'}, 'pins': [%s], " MATERIAL
                              ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
                              "4e-3}, 'gravity': [0, 0, 0], %s,"
                              " 'duration': 1.6, 'frame_rate': 30}",
                              wringing(200), 1e6, method_of(some[k], 0.02));
-        snprintf(what, sizeof what, "wrung, %s", some[k]);
-        press(&s, 1.6, what);
+        ck_assert_int_eq(drape_sim_observe(s.sim, crossings_observe, &run), DRAPE_OK);
+        scene_advance(&s, 1.6);
+        ck_assert_msg(run.crossed_states + run.crossed_frames == 0, "%s: %s", some[k], run.first);
         scene_close(&s);
     }
     unlink("tube.obj");
@@ -532,6 +281,5 @@ START_TEST(wrung)
 }
 END_TEST
 
-SUITE("least_gap", over_a_tip, strip_across_strip, blown, between_two_boards, wrung, stiffening_is_work,
-      what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up,
-      stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)
+SUITE("least_gap", wrung, stiffening_is_work, what_begins_inside_is_pushed_out_gently,
+      rounding_does_not_add_up, stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)

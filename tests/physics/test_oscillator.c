@@ -32,11 +32,6 @@ static scene hexagon(double dt, double speed, double tolerance, const char *term
                       tolerance);
 }
 
-static double frequency(const scene *s)
-{
-    return sqrt(stiffness / s->model->mass[CENTRE]);
-}
-
 static double mass(void)
 {
     return 0.2 * sqrt(3.0) / 2 * LENGTH * LENGTH; /* a node of the lattice */
@@ -48,34 +43,6 @@ static double step_error(const scene *s, double amplitude)
     const double noise = force_noise(stiffness / 3, LENGTH);
     return e * e + 4 * DBL_EPSILON / e + (s->residual + noise) / (stiffness * amplitude);
 }
-
-/* E_{n+1}/E_n = 1/(1 + (w h)^2) at any phase. */
-START_TEST(energy_factor_of_backward_euler)
-{
-    static const double phases[] = {0.1, 0.5, 2};
-    for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
-        const double w = sqrt(stiffness / mass()), h = phases[k] / w, amplitude = 1e-5 * LENGTH;
-        const double factor = 1 / (1 + phases[k] * phases[k]);
-        scene s = hexagon(h, amplitude * w, 1e-12, "");
-        const int steps = k == 0 ? STEPS : STEPS / 2;
-        scene_watch(&s);
-        double before = drape_sim_energy(s.sim).kinetic, worst = 0, least = amplitude;
-        ck_assert_double_eq_tol(frequency(&s) / w, 1, 16 * DBL_EPSILON);
-        for (int n = 1; n <= steps; n++) {
-            scene_advance(&s, n * h);
-            const drape_energy e = drape_sim_energy(s.sim);
-            const double now = e.kinetic + e.elastic;
-            worst = fmax(worst, fabs(now / before - factor) / factor);
-            before = now;
-            least *= sqrt(factor);
-        }
-        ck_assert_int_eq(s.accepted, steps);
-        /* Energies are squares: twice the error of the amplitudes of two states. */
-        assert_below(worst, 4 * step_error(&s, least) + 4 * step_error(&s, amplitude));
-        scene_close(&s);
-    }
-}
-END_TEST
 
 /* With a dashpot beside every spring, m a = -3 K (x + beta v): (x, v)_{n+1} = A (x, v)_n with
  *     v1 = (v0 - h w^2 x0)/c,   x1 = x0 + h v1,   c = 1 + h w^2 (h + beta),
@@ -112,4 +79,4 @@ START_TEST(damped_oscillator_follows_its_amplification_matrix)
 }
 END_TEST
 
-SUITE("oscillator", energy_factor_of_backward_euler, damped_oscillator_follows_its_amplification_matrix)
+SUITE("oscillator", damped_oscillator_follows_its_amplification_matrix)

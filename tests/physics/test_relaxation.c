@@ -77,34 +77,6 @@ START_TEST(coefficients_of_a_step)
 }
 END_TEST
 
-/* The recurrence is exact at constant strain, in steps of any size; what is lost is that of the springs: of
- * the energy U at once, sum g (1 - exp(-2 t/time)). */
-START_TEST(stress_relaxes_by_the_prony_series)
-{
-    static const char *const methods[] = {
-        "{'method': 'be', 'dt': 0.05}",       "{'method': 'bdf2', 'dt': 0.05}",
-        "{'method': 'trbdf2', 'dt': 0.05}",   "{'method': 'midpoint', 'dt': 0.05}",
-        "{'method': 'newton_k', 'dt': 0.05}", "{'method': 'verlet', 'dt': 0.05}"};
-    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-        scene s = held(methods[i]);
-        stretch(&s, STRAIN);
-        const double at_once = pull_of(&s), energy = drape_sim_energy(s.sim).elastic;
-        for (int k = 1; k <= 3; k++) {
-            const double t = 0.3 * k;
-            scene_advance(&s, t);
-            const drape_energy e = drape_sim_energy(s.sim);
-            const double force = 0.5 + 0.3 * exp(-t / 0.1) + 0.2 * exp(-t / 2),
-                         lost = -0.3 * expm1(-2 * t / 0.1) - 0.2 * expm1(-2 * t / 2);
-            ck_assert_msg(fabs(pull_of(&s) / at_once - force) < 1e-9, "%s: %.12g, not %.12g", methods[i],
-                          pull_of(&s) / at_once, force);
-            assert_below(fabs(e.dissipated / energy - lost), 1e-9);
-            assert_below(fabs(e.numerical), 1e-9 * energy);
-        }
-        scene_close(&s);
-    }
-}
-END_TEST
-
 /* "static" finds the equilibrium after an infinite time, and leaves the branches without force. */
 START_TEST(equilibria_are_relaxed)
 {
@@ -301,7 +273,7 @@ START_TEST(equilibria_need_a_lasting_part)
 }
 END_TEST
 
-SUITE("relaxation", coefficients_of_a_step, stress_relaxes_by_the_prony_series, equilibria_are_relaxed,
+SUITE("relaxation", coefficients_of_a_step, equilibria_are_relaxed,
       losses_are_in_the_balance, checkpoints_keep_branches, a_new_model_keeps_branches,
       a_new_model_is_refused_as_a_first_one, threads_change_no_bit, derivatives_agree_with_differences,
       wrong_series_are_refused, integrators_with_steps_of_their_own_refuse_it, equilibria_need_a_lasting_part)
