@@ -140,23 +140,6 @@ static uint64_t hash_after(drape_context *ctx, const drape_model *model, double 
     return hash;
 }
 
-/* ---- Arguments ---- */
-
-START_TEST(destroy_writes_null)
-{
-    drape_context *ctx = make_context();
-    drape_scene *scene = NULL;
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = make_sim(ctx, model);
-    ck_assert_int_eq(drape_scene_parse(ctx, "{}", "s.json", &scene), DRAPE_OK);
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_scene_destroy(&scene);
-    drape_context_destroy(&ctx);
-    ck_assert(!sim && !model && !scene && !ctx);
-}
-END_TEST
-
 /* ---- Defs ---- */
 
 START_TEST(defs_that_were_not_initialised_are_refused)
@@ -380,7 +363,7 @@ START_TEST(sim_defs_are_checked)
 }
 END_TEST
 
-/* Parts of a scene that are NULL where there should be something, or zeroed: each an assignment to the defs. */
+/* Parts of a scene that are NULL where there should be something, or zeroed: assignments to the defs. */
 #define ZEROED(PART)                                                                                         \
     PART(s.terms[1] = (drape_entry_def){0})                                                                  \
     PART(s.cloth.terms = NULL)                                                                               \
@@ -1142,49 +1125,6 @@ START_TEST(advances_may_be_cut_up)
 }
 END_TEST
 
-START_TEST(statistics_agree_with_the_events)
-{
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = NULL;
-    drape_sim_def def;
-    record r = {0};
-    const drape_setting few = {"max_iterations", 1, NULL}; /* so that some steps are rejected */
-    int64_t rejected = 0, count;
-    drape_sim_def_init(&def, sizeof def);
-    def.integrator = "bdf2"; /* be has one more Jacobian a step where pins move, for its guess */
-    def.integrator_settings = &few;
-    def.integrator_setting_count = 1;
-    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 0);
-    ck_assert_double_eq(drape_sim_statistics(sim).h_max, 0);
-    ck_assert_msg(drape_sim_advance(sim, 0.2) == DRAPE_OK, "%s", drape_context_message(ctx));
-    drape_statistics s = drape_sim_statistics(sim);
-    for (int i = 0; drape_sim_reason(sim, i, &count); i++) {
-        ck_assert_int_gt(count, 0);
-        rejected += count;
-    }
-    ck_assert_int_gt(rejected, 0);
-    ck_assert_int_eq(s.steps_rejected, rejected);
-    ck_assert_int_eq(s.steps_accepted, r.accepted);
-    ck_assert_int_eq(s.steps_accepted + s.steps_rejected, r.attempts);
-    ck_assert_double_eq(s.h_min, r.h_min);
-    ck_assert_double_eq(s.h_max, r.h_max);
-    ck_assert_double_eq_tol(r.sum, 0.2, 1e-14);
-    ck_assert_double_eq(drape_sim_time(sim), 0.2);
-    ck_assert_int_eq(s.newton_iterations, r.iterations);
-    ck_assert(s.residuals > s.newton_iterations && s.jacobians <= s.newton_iterations);
-    ck_assert(s.factorizations == s.jacobians && s.linear_iterations >= s.factorizations);
-    ck_assert(s.strain_min <= 0 && s.strain_max >= 0 && s.strain_max < 1);
-    ck_assert(s.wall_steps >= s.wall_residual + s.wall_jacobian + s.wall_factor + s.wall_solve);
-    ck_assert(s.wall_setup > 0 && s.wall_contact == 0);
-    drape_energy e = drape_sim_energy(sim);
-    ck_assert(e.kinetic > 0 && e.elastic > 0 && e.contact == 0 && e.dissipated > 0);
-    close_all(&ctx, &model, &sim);
-}
-END_TEST
-
 /* ---- States set by the host ---- */
 
 #define MAX_NODES 36
@@ -1289,42 +1229,6 @@ START_TEST(a_state_of_the_host_is_where_a_run_starts)
         ck_assert_double_eq_tol(drape_sim_positions(sim)[i], s.x[i] + s.v[i] + g * 65 / 128, 1e-10);
     }
     close_all(&ctx, &model, &sim);
-}
-END_TEST
-
-/* The state of one sim set in another, with hinges, dashpots and a moving pin: both advance to the same bits,
- * and the energy account of the second begins there. */
-START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
-{
-    static const char *const integrators[] = {"be", "midpoint", "trbdf2"};
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    for (int i = 0; i < 3; i++) {
-        drape_sim *one = make_sim_of(ctx, model, integrators[i], "fixed"),
-                  *other = make_sim_of(ctx, model, integrators[i], "fixed");
-        ck_assert_int_eq(drape_sim_advance(one, 0.25), DRAPE_OK);
-        const state middle = state_of(one);
-        const drape_energy before = drape_sim_energy(one);
-        ck_assert_int_eq(set_state(other, &middle), DRAPE_OK);
-        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(one));
-        const drape_energy start = drape_sim_energy(other);
-        ck_assert_double_eq(start.kinetic, before.kinetic);
-        ck_assert_double_eq(start.elastic, before.elastic);
-        ck_assert_double_eq(start.dissipated, 0);
-        ck_assert_double_eq(start.numerical, 0);
-        ck_assert_int_eq(drape_sim_advance(one, 0.5), DRAPE_OK);
-        ck_assert_int_eq(drape_sim_advance(other, 0.5), DRAPE_OK);
-        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(one));
-        const drape_energy a = drape_sim_energy(one), b = drape_sim_energy(other);
-        ck_assert_double_gt(b.dissipated, 0);
-        ck_assert_double_eq_tol(b.dissipated, a.dissipated - before.dissipated,
-                                1e-12); /* rounding of sums of 1 J */
-        ck_assert_double_eq_tol(b.numerical, a.numerical - before.numerical, 1e-12);
-        drape_sim_destroy(&one);
-        drape_sim_destroy(&other);
-    }
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
 END_TEST
 
@@ -1460,26 +1364,6 @@ START_TEST(frames_follow_the_time_of_a_state)
         ck_assert_double_eq_tol(r.first, jumps[i].first, 1e-15);
         ck_assert_int_eq(r.number, llround(30 * r.first));
     }
-    close_all(&ctx, &model, &sim);
-}
-END_TEST
-
-/* A push between two advances, at the time of a frame, does not repeat that frame. */
-START_TEST(a_push_repeats_no_frame)
-{
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = make_sim(ctx, model);
-    record r = {0};
-    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
-    ck_assert_int_eq(r.frames, 4);
-    state s = state_of(sim);
-    for (int i = 0; i < MAX_NODES; i++)
-        s.v[3 * i] += 0.5;
-    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.11), DRAPE_OK);
-    ck_assert_int_eq(r.frames, 4);
     close_all(&ctx, &model, &sim);
 }
 END_TEST
@@ -1640,18 +1524,16 @@ START_TEST(messages_are_one_line)
 }
 END_TEST
 
-SUITE("api", destroy_writes_null, defs_that_were_not_initialised_are_refused, every_older_def_is_read,
-      defs_in_arrays_are_checked, half_an_allocator_is_refused, sim_defs_are_checked,
-      zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,
-      the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
-      a_user_defined_term_works, ops_are_copied_and_may_be_older,
+SUITE("api", defs_that_were_not_initialised_are_refused, every_older_def_is_read, defs_in_arrays_are_checked,
+      half_an_allocator_is_refused, sim_defs_are_checked, zeroed_parts_of_a_scene_are_refused,
+      a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
+      an_override_is_a_value_of_the_scene, a_user_defined_term_works, ops_are_copied_and_may_be_older,
       faults_of_a_user_defined_term_are_reported_at_its_place, elements_of_a_user_defined_term_are_checked,
       malformed_terms_are_refused, colliders_of_a_scene_can_be_asked,
       a_collider_in_memory_is_the_same_as_in_a_file, numbers_below_not_given_are_refused,
       a_user_defined_collider_works, malformed_colliders_are_refused, frames_come_in_time,
-      advances_may_be_cut_up, statistics_agree_with_the_events, a_collapsed_state_leaves_nothing_behind,
-      a_state_of_the_host_is_where_a_run_starts, a_state_of_another_sim_is_taken_to_the_bit,
-      the_past_does_not_count_after_a_state_was_set, states_of_the_host_are_checked,
-      frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
+      advances_may_be_cut_up, a_collapsed_state_leaves_nothing_behind,
+      a_state_of_the_host_is_where_a_run_starts, the_past_does_not_count_after_a_state_was_set,
+      states_of_the_host_are_checked, frames_follow_the_time_of_a_state,
       more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,
       a_sim_has_at_most_8_observers, statuses_have_names, messages_are_one_line)

@@ -165,35 +165,6 @@ END_TEST
 
 /* ---- Gravity and materials ---- */
 
-/* A sheet that only falls has no forces within: without gravity it goes on at the velocity that it has, and
- * the energy account stays balanced. A step of an implicit method has an error of the tolerance, of 1e-9 N
- * on a mass of 1e-3 kg: 1e-6 m/s2, over 0.25 s 3e-8 m; the error of `ida` is rtol of its speed. */
-START_TEST(without_gravity_cloth_flies_on)
-{
-    for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        changing c = open_changing(&memory, methods[i], free_sheet);
-        const size_t n = 3 * (size_t)nodes_of(&c);
-        double x[60], v[60];
-        ck_assert_uint_eq(n, 60);
-        advance(&c, 16 * FRAME);
-        memcpy(x, drape_sim_positions(c.h.sim), sizeof x);
-        memcpy(v, drape_sim_velocities(c.h.sim), sizeof v);
-        const double numerical = drape_sim_energy(c.h.sim).numerical;
-        set(&c, "/gravity", "[0,0,0]");
-        good(&c.h, drape_sim_change(c.h.sim, c.scene));
-        ck_assert_double_eq_tol(drape_sim_energy(c.h.sim).numerical, numerical, 1e-14);
-        ck_assert_double_eq(drape_sim_energy(c.h.sim).gravity, 0);
-        advance(&c, 16 * FRAME);
-        for (size_t k = 0; k < n; k++)
-            ck_assert_msg(fabs(drape_sim_positions(c.h.sim)[k] - x[k] - 16 * FRAME * v[k]) < 1e-6, "%s: %g",
-                          methods[i], drape_sim_positions(c.h.sim)[k] - x[k] - 16 * FRAME * v[k]);
-        ck_assert_double_eq_tol(drape_sim_energy(c.h.sim).numerical, numerical, 1e-6);
-        close_changing(&c, &memory);
-    }
-}
-END_TEST
-
 /* Springs have an energy in proportion to Young's modulus. The change adds to the energy, and as the host
  * gave that, nothing to the numerical dissipation; the guard against energy out of nothing has no alarm in
  * the steps after. */
@@ -325,30 +296,6 @@ START_TEST(floors_come_and_go)
 }
 END_TEST
 
-/* Colliders are known by their names: one that the host has moved stays where it is when another one is put
- * before it. */
-START_TEST(a_moved_collider_stays_where_it_is)
-{
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", on_ball);
-    const double to[3] = {0.02, -0.05, 0.01};
-    good(&c.h, drape_sim_move_collider(c.h.sim, 1, FRAME, to, NULL));
-    advance(&c, 2 * FRAME);
-    set(&c, "/colliders",
-        "[{\"type\": \"box\", \"name\": \"new\", \"center\": [0, -5, 0], \"size\": [1, 1, 1]}, "
-        "{\"type\": \"sphere\", \"center\": [0.25, -0.11, 0.15], \"radius\": 0.1, \"name\": "
-        "\"ball\", \"friction\": 0.3}]");
-    good(&c.h, drape_sim_change(c.h.sim, c.scene));
-    const drape_collider_motion ball = drape_sim_collider(c.h.sim, 1);
-    ck_assert_str_eq(ball.name, "ball");
-    for (int k = 0; k < 3; k++)
-        ck_assert_double_eq(ball.displacement[k], to[k]);
-    ck_assert_double_eq(drape_sim_collider(c.h.sim, 0).displacement[0], 0);
-    advance(&c, 8 * FRAME);
-    close_changing(&c, &memory);
-}
-END_TEST
-
 /* ---- Pins ---- */
 
 /* The velocity of the centre of mass, for all nodes free. */
@@ -406,64 +353,6 @@ START_TEST(pins_come_and_go)
 }
 END_TEST
 
-/* Pins that the host made stay when the model changes, and move as it says. */
-START_TEST(made_pins_stay_through_a_change)
-{
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", hanging);
-    const int32_t top[] = {1, 2, 3}, corner = 19;
-    advance(&c, 4 * FRAME);
-    good(&c.h, drape_sim_unpin(c.h.sim, 3, top));
-    good(&c.h, drape_sim_pin(c.h.sim, 1, &corner));
-    set(&c, "/gravity", "[0,-1,0]");
-    good(&c.h, drape_sim_change(c.h.sim, c.scene));
-    const uint8_t *pinned = drape_model_pinned(drape_sim_model(c.h.sim));
-    for (int32_t i = 0; i < 20; i++)
-        ck_assert_int_eq(pinned[i], i == 0 || i == 4 || i == 19);
-    double to[3];
-    memcpy(to, drape_sim_positions(c.h.sim) + 3 * (size_t)corner, sizeof to);
-    to[2] += 0.05;
-    good(&c.h, drape_sim_move_pins(c.h.sim, 1, &corner, FRAME, to, NULL));
-    advance(&c, FRAME);
-    ck_assert_mem_eq(to, drape_sim_positions(c.h.sim) + 3 * (size_t)corner, sizeof to);
-    const uint64_t hash = drape_sim_hash(c.h.sim);
-    good(&c.h, drape_sim_pin(c.h.sim, 1, &corner)); /* it is already */
-    good(&c.h, drape_sim_pin(c.h.sim, 0, NULL));
-    ck_assert(drape_sim_hash(c.h.sim) == hash);
-    close_changing(&c, &memory);
-}
-END_TEST
-
-/* ---- Checkpoints ---- */
-
-/* A checkpoint after a change is one of the new model, in a sim that has no other history. */
-START_TEST(checkpoint_after_a_change)
-{
-    for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        changing c = open_changing(&memory, methods[i], on_ball);
-        advance(&c, 8 * FRAME);
-        bytes old = bytes_save(c.h.sim);
-        set(&c, "/colliders/1/friction", "0.7");
-        set(&c, "/cloth/0/pins/-", "{\"corner\": \"bottom-right\"}");
-        good(&c.h, drape_sim_change(c.h.sim, c.scene));
-        advance(&c, 2 * FRAME);
-        bytes kept = bytes_save(c.h.sim);
-        advance(&c, 4 * FRAME);
-        const uint64_t hash = drape_sim_hash(c.h.sim);
-        good(&c.h, drape_sim_restore_from(c.h.sim, kept.data, kept.size)); /* the model is still the sim's */
-        advance(&c, 4 * FRAME);
-        ck_assert_msg(drape_sim_hash(c.h.sim) == hash, "%s", methods[i]);
-        says(&c.h, drape_sim_restore_from(c.h.sim, old.data, old.size), DRAPE_E_ARGUMENT,
-             "the checkpoint does not fit");
-        ck_assert(drape_sim_hash(c.h.sim) == hash);
-        free(old.data);
-        free(kept.data);
-        close_changing(&c, &memory);
-    }
-}
-END_TEST
-
 /* ---- What else goes on ---- */
 
 static drape_status count_frames(void *user, const drape_event *event)
@@ -504,43 +393,6 @@ START_TEST(the_rest_goes_on)
     advance(&c, 8 * FRAME);
     ck_assert_int_eq(frames, 17);
     close_changing(&c, &memory);
-}
-END_TEST
-
-static void blow(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
-{
-    (void)user, (void)t, (void)x, (void)gradient;
-    for (int32_t i = 0; i < count; i++)
-        wind[3 * i + 2] = 5;
-}
-
-/* A sim in the wind goes through a model that does not feel it; again tells what is set after that. */
-static uint64_t through_calm(drape_wind_field *first, bool again, drape_wind_field *then)
-{
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", hanging);
-    set(&c, "/cloth/0/terms/-", "\"drag.wind\"");
-    good(&c.h, drape_sim_change(c.h.sim, c.scene));
-    good(&c.h, drape_sim_set_wind(c.h.sim, first, NULL));
-    set(&c, "/cloth/0/terms/2", NULL);
-    good(&c.h, drape_sim_change(c.h.sim, c.scene));
-    advance(&c, 4 * FRAME);
-    set(&c, "/cloth/0/terms/-", "\"drag.wind\"");
-    good(&c.h, drape_sim_change(c.h.sim, c.scene));
-    if (again)
-        good(&c.h, drape_sim_set_wind(c.h.sim, then, NULL));
-    advance(&c, 4 * FRAME);
-    const uint64_t hash = drape_sim_hash(c.h.sim);
-    close_changing(&c, &memory);
-    return hash;
-}
-
-/* The wind goes on, also through a model without a term in it, where it does nothing. */
-START_TEST(wind_goes_on_through_a_model_without_it)
-{
-    const uint64_t kept = through_calm(blow, false, NULL);
-    ck_assert_uint_eq(kept, through_calm(NULL, true, blow));
-    ck_assert_uint_ne(kept, through_calm(blow, true, NULL));
 }
 END_TEST
 
@@ -600,8 +452,7 @@ START_TEST(a_change_without_memory)
 }
 END_TEST
 
-SUITE("change", same_model_changes_nothing, supports_keep_their_velocities, without_gravity_cloth_flies_on,
+SUITE("change", same_model_changes_nothing, supports_keep_their_velocities,
       a_stiffer_cloth_has_the_energy_of_its_strain, goes_on_as_with_the_value_from_the_start,
-      floors_come_and_go, a_moved_collider_stays_where_it_is, pins_come_and_go,
-      made_pins_stay_through_a_change, checkpoint_after_a_change, the_rest_goes_on,
-      wind_goes_on_through_a_model_without_it, refusals_leave_the_sim_as_it_was, a_change_without_memory)
+      floors_come_and_go, pins_come_and_go, the_rest_goes_on, refusals_leave_the_sim_as_it_was,
+      a_change_without_memory)

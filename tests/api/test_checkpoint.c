@@ -88,30 +88,6 @@ START_TEST(a_file_is_taken_by_another_sim)
 }
 END_TEST
 
-/* Restores an earlier time and advances again, several times. */
-START_TEST(a_sim_is_taken_back)
-{
-    drape_context *ctx = make_context();
-    drape_model *model = make_model(ctx, "bdf2");
-    drape_sim *sim = make_sim(ctx, model, 1);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
-    bytes here = bytes_save(sim);
-    uint64_t first = 0;
-    for (int k = 0; k < 5; k++) {
-        ck_assert_int_eq(drape_sim_advance(sim, 0.3), DRAPE_OK);
-        first = k == 0 ? drape_sim_hash(sim) : first;
-        ck_assert_uint_eq(drape_sim_hash(sim), first);
-        ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 30);
-        ck_assert_int_eq(drape_sim_advance(sim, 0.31 + 0.1 * k), DRAPE_OK);
-        ck_assert_int_eq(drape_sim_restore_from(sim, here.data, here.size), DRAPE_OK);
-    }
-    free(here.data);
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
-}
-END_TEST
-
 /* One model; in each thread a context and a sim, all restored from the same bytes. */
 typedef struct worker {
     const drape_model *model;
@@ -119,4 +95,4 @@ typedef struct worker {
     uint64_t hash;
 } worker;
 
-SUITE("api/checkpoint", a_file_is_taken_by_another_sim, a_sim_is_taken_back)
+SUITE("api/checkpoint", a_file_is_taken_by_another_sim)

@@ -78,43 +78,6 @@ START_TEST(pins_go_where_they_are_sent)
 }
 END_TEST
 
-/* A pin that the host moves along the pieces of a track, from key to key, gives the same steps as the track,
- * up to the rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m amplifies to
- * at most 1e-10 m. */
-START_TEST(a_host_is_as_good_as_a_track)
-{
-    static const char track[] =
-        "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0, [0,0,0]], [0.0625, [0,0.02,0.01]], "
-        "[0.125, [-0.01,0.01,0.03]], [0.1875, [0,0,0]]]}";
-    static const double keys[3][3] = {{0, 0.02, 0.01}, {-0.01, 0.01, 0.03}, {0, 0, 0}};
-    static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",
-                                           "'method': 'ida', 'rtol': 1e-5"};
-    for (int i = 0; i < 2; i++) {
-        failing_allocator memory[2] = {{0}, {0}};
-        host on = open_scene(&memory[0], SHEET, "", track, settings[i], ""),
-             by = open_scene(&memory[1], SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}",
-                             settings[i], "");
-        const int32_t node = 4;
-        for (int k = 0; k < 3; k++) {
-            double to[3], worst = 0;
-            for (int c = 0; c < 3; c++)
-                to[c] = drape_model_rest_positions(by.model)[12 + c] + keys[k][c];
-            good(&by, drape_sim_move_pins(by.sim, 1, &node, 0.0625, to, NULL));
-            good(&by, drape_sim_advance(by.sim, 0.0625 * (k + 1)));
-            good(&on, drape_sim_advance(on.sim, 0.0625 * (k + 1)));
-            for (int n = 0; n < 20; n++)
-                worst = fmax(worst, distance(drape_sim_positions(on.sim) + 3 * n,
-                                             drape_sim_positions(by.sim) + 3 * n));
-            ck_assert_msg(worst <= 1e-9, "%s, key %d: %g m apart", settings[i], k, worst);
-            double work = fabs(drape_sim_energy(on.sim).numerical - drape_sim_energy(by.sim).numerical);
-            ck_assert_double_le(work, 1e-8);
-        }
-        close_scene(&on, &memory[0]);
-        close_scene(&by, &memory[1]);
-    }
-}
-END_TEST
-
 /* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and
  * restarts no integrator: ida, which restarts at every kink, takes fewer steps than with straight paths. */
 START_TEST(velocities_make_a_motion_smooth)
@@ -415,93 +378,9 @@ START_TEST(wind_takes_cloth_along)
 }
 END_TEST
 
-/* A steady wind set by the host is added to the parameter "wind" of drag.wind: the same equations as with the
- * sum as parameter, and the same states up to rounding. In newton_k, whose inner solves end at a share of
- * their first residual, the difference is some 1e-8 m. */
-START_TEST(a_steady_wind_is_that_of_the_term)
-{
-    for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory[2] = {{0}, {0}};
-        host own = open_scene(&memory[0], DRAG, "{'type': 'drag.wind', 'wind': [1, 2, -1]}", methods[i], ""),
-             by = open_scene(&memory[1], DRAG, "{'type': 'drag.wind', 'wind': [0, 2, 0]}", methods[i], "");
-        field f = {.w0 = {1, 0, -1}};
-        good(&by, drape_sim_set_wind(by.sim, blow, &f));
-        good(&by, drape_sim_advance(by.sim, 0.25));
-        good(&own, drape_sim_advance(own.sim, 0.25));
-        double apart = 0;
-        for (int n = 0; n < drape_model_node_count(by.model); n++)
-            apart = fmax(apart,
-                         distance(drape_sim_positions(own.sim) + 3 * n, drape_sim_positions(by.sim) + 3 * n));
-        ck_assert_msg(apart < 1e-6, "%s: %g m apart", methods[i], apart);
-        ck_assert_double_gt(distance(drape_sim_positions(by.sim), drape_model_rest_positions(by.model)),
-                            0.01);
-        good(&by, drape_sim_set_wind(by.sim, NULL, NULL));
-        long calls = f.calls;
-        good(&by, drape_sim_advance(by.sim, 0.5));
-        ck_assert_int_eq(f.calls, calls);
-        close_scene(&own, &memory[0]);
-        close_scene(&by, &memory[1]);
-    }
-}
-END_TEST
-
-/* With the gradient of the wind field Newton's method converges fast; without it, it reaches the same state
- * in more iterations. */
-START_TEST(a_field_without_gradient_takes_longer)
-{
-    double x[2][3];
-    int64_t iterations[2];
-    for (int lagged = 0; lagged < 2; lagged++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, DRAG, "{'type': 'drag.viscous', 'coefficient': 5}", "be",
-                            ", 'tolerance': 1e-9");
-        field f = {.w0 = {0, 1, 0}, .g = {0, -8, 0, 8, 0, 0, 0, 0, 4}, .lagged = lagged};
-        good(&h, drape_sim_set_wind(h.sim, blow, &f));
-        good(&h, drape_sim_advance(h.sim, 0.125));
-        memcpy(x[lagged], drape_sim_positions(h.sim), sizeof x[lagged]);
-        iterations[lagged] = drape_sim_statistics(h.sim).newton_iterations;
-        close_scene(&h, &memory);
-    }
-    ck_assert_double_le(distance(x[0], x[1]), 1e-8);
-    ck_assert_msg(iterations[0] < iterations[1], "%ld and %ld", (long)iterations[0], (long)iterations[1]);
-}
-END_TEST
-
 /* ---- Cancelling ---- */
 
 static const char pins[] = "{'corner': 'top-left'}, {'corner': 'top-right'}";
-
-/* Cancelled before an advance: it returns at once, and the next advance gives the same bits as without. */
-START_TEST(a_cancelled_advance_can_go_on)
-{
-    for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory[2] = {{0}, {0}};
-        char method[64];
-        snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
-        host whole = open_scene(&memory[0], SHEET, "", pins, method, ""),
-             cut = open_scene(&memory[1], SHEET, "", pins, method, "");
-        good(&whole, drape_sim_advance(whole.sim, 0.125));
-        good(&whole, drape_sim_advance(whole.sim, 0.25));
-        good(&cut, drape_sim_advance(cut.sim, 0.125));
-        uint64_t before = drape_sim_hash(cut.sim);
-        drape_sim_cancel(cut.sim);
-        says(&cut, drape_sim_advance(cut.sim, 0.25), DRAPE_E_STOPPED, "t=0.125: cancelled");
-        ck_assert_uint_eq(drape_sim_hash(cut.sim), before);
-        ck_assert_int_eq(drape_sim_statistics(cut.sim).steps_rejected,
-                         drape_sim_statistics(whole.sim).steps_rejected);
-        good(&cut, drape_sim_advance(cut.sim, 0.25));
-        ck_assert_msg(drape_sim_hash(cut.sim) == drape_sim_hash(whole.sim), "%s", methods[i]);
-        drape_sim_cancel(cut.sim);
-        drape_realtime report;
-        ck_assert_int_eq(drape_sim_advance_realtime(cut.sim, FRAME, 1, &report), DRAPE_E_STOPPED);
-        ck_assert_int_eq(report.attempts, 0);
-        good(&cut, drape_sim_advance_realtime(cut.sim, FRAME, 1, &report));
-        close_scene(&whole, &memory[0]);
-        close_scene(&cut, &memory[1]);
-    }
-    drape_sim_cancel(NULL);
-}
-END_TEST
 
 typedef struct trigger {
     drape_sim *sim;
@@ -548,39 +427,6 @@ START_TEST(a_step_can_be_cancelled)
         ck_assert_double_eq(drape_sim_time(h.sim), 0.25);
         close_scene(&h, &memory);
     }
-}
-END_TEST
-
-/* A wind that would change the sim, or advance it, in the middle of a step. */
-static void meddle(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
-{
-    trigger *now = user;
-    const int32_t node = 20;
-    (void)t, (void)count, (void)x, (void)wind, (void)gradient;
-    now->calls++;
-    now->at += drape_sim_pin(now->sim, 1, &node) == DRAPE_E_ARGUMENT &&
-               drape_sim_advance(now->sim, 1) == DRAPE_E_ARGUMENT &&
-               drape_sim_push(now->sim, NULL) == DRAPE_E_ARGUMENT;
-}
-
-/* Functions of a host that are called while the sim advances are refused what would change it, and the run
- * goes on as with one that does not try. */
-START_TEST(a_wind_changes_nothing)
-{
-    uint64_t hash[2];
-    for (int i = 0; i < 2; i++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, SHEET, ", {'type': 'drag.viscous', 'coefficient': 0.1}", pins,
-                            "'method': 'be', 'dt': 0.0078125", "");
-        trigger t = {.sim = h.sim};
-        good(&h, drape_sim_set_wind(h.sim, i ? meddle : still_air, &t));
-        good(&h, drape_sim_advance(h.sim, 0.0625));
-        ck_assert(i == 0 || (t.calls > 0 && t.at == t.calls));
-        hash[i] = drape_sim_hash(h.sim);
-        good(&h, drape_sim_push(h.sim, NULL));
-        close_scene(&h, &memory);
-    }
-    ck_assert_uint_eq(hash[0], hash[1]);
 }
 END_TEST
 
@@ -639,56 +485,6 @@ START_TEST(normals_are_of_length_one)
     drape_sim_normals(NULL, n);
     drape_sim_normals(h.sim, NULL);
     close_scene(&h, &memory);
-}
-END_TEST
-
-/* ---- Checkpoints ---- */
-
-/* Paths that begin in one frame and end in another. */
-static void send_all(host *h, field *f, double sign)
-{
-    const int32_t nodes[2] = {0, 3};
-    const double *rest = drape_model_rest_positions(h->model);
-    const double to[6] = {rest[0], rest[1] + 0.02 * sign, rest[2], rest[9], rest[10], rest[11] + 0.03 * sign};
-    const double v[6] = {0.3 * sign}, by[3] = {0, 0, -0.05 * sign};
-    double push[60] = {0};
-    push[3 * 12] = 0.02 * sign;
-    good(h, drape_sim_move_pins(h->sim, 2, nodes, 2 * FRAME, to, v));
-    good(h, drape_sim_move_collider(h->sim, 0, 3 * FRAME, by, NULL));
-    good(h, drape_sim_push(h->sim, push));
-    good(h, drape_sim_set_wind(h->sim, blow, f));
-}
-
-/* Saved while the host moves pins and colliders, and restored into a sim that moves them elsewhere: the same
- * bits to the end, with the wind that the restored sim was given. Restoring does not change whether a sim is
- * cancelled. */
-START_TEST(a_checkpoint_keeps_what_the_host_moves)
-{
-    for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory[2] = {{0}, {0}};
-        char method[64], ball[256];
-        snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
-        snprintf(ball, sizeof ball, BALL, "");
-        host one = open_scene(&memory[0], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball),
-             two = open_scene(&memory[1], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball);
-        field f = {.w0 = {1, 0, -1}, .w1 = {0, 2, 0}};
-        send_all(&one, &f, 1);
-        good(&one, drape_sim_advance(one.sim, FRAME));
-        bytes saved = bytes_save(one.sim);
-        good(&one, drape_sim_advance(one.sim, 4 * FRAME));
-        send_all(&two, &f, -1);
-        good(&two, drape_sim_advance(two.sim, 2 * FRAME));
-        drape_sim_cancel(two.sim);
-        good(&two, drape_sim_restore_from(two.sim, saved.data, saved.size));
-        says(&two, drape_sim_advance(two.sim, 4 * FRAME), DRAPE_E_STOPPED, "cancelled");
-        good(&two, drape_sim_advance(two.sim, 4 * FRAME));
-        ck_assert_msg(drape_sim_hash(one.sim) == drape_sim_hash(two.sim), "%s", methods[i]);
-        drape_sim_cancel(two.sim);
-        says(&two, drape_sim_advance(two.sim, 5 * FRAME), DRAPE_E_STOPPED, "cancelled");
-        free(saved.data);
-        close_scene(&one, &memory[0]);
-        close_scene(&two, &memory[1]);
-    }
 }
 END_TEST
 
@@ -843,42 +639,8 @@ START_TEST(hosts_in_threads_share_a_model)
 }
 END_TEST
 
-/* After a sim is made, nothing is allocated. */
-START_TEST(a_host_needs_no_memory)
-{
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, ", 'drag.wind'", "{'edge': 'top'}", "", "");
-    field f = {.w0 = {1, 0, 1}};
-    double forces[60] = {0}, to[3] = {0, 0.1, 0};
-    const int32_t node = 0;
-    drape_place_def place;
-    drape_place_def_init(&place, sizeof place);
-    place.translate[0] = 1;
-    long calls = memory.calls;
-    good(&h, drape_sim_advance(h.sim, FRAME));
-    good(&h, drape_sim_set_wind(h.sim, blow, &f));
-    ck_assert_int_eq(f.calls, 0);
-    good(&h, drape_sim_set_wind(h.sim, NULL, NULL));
-    good(&h, drape_sim_set_wind(h.sim, blow, &f));
-    good(&h, drape_sim_move_pins(h.sim, 1, &node, FRAME, to, NULL));
-    good(&h, drape_sim_push(h.sim, forces));
-    good(&h, drape_sim_advance(h.sim, 2 * FRAME));
-    good(&h, drape_sim_reactions(h.sim, forces));
-    good(&h, drape_sim_contact_forces(h.sim, forces));
-    drape_sim_normals(h.sim, forces);
-    good(&h, drape_sim_place(h.sim, &place));
-    drape_sim_cancel(h.sim);
-    ck_assert_int_eq(drape_sim_advance(h.sim, 3 * FRAME), DRAPE_E_STOPPED);
-    ck_assert_int_eq(memory.calls, calls);
-    close_scene(&h, &memory);
-}
-END_TEST
-
-SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocities_make_a_motion_smooth,
-      a_state_takes_moved_pins_along, a_collider_goes_where_it_is_sent, reactions_carry_the_weight,
-      observers_read_forces, a_push_does_its_work, every_integrator_is_pushed,
-      springs_of_verlet_are_pushed_and_pulled, contact_carries_the_weight, wind_takes_cloth_along,
-      a_steady_wind_is_that_of_the_term, a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on,
-      a_step_can_be_cancelled, a_wind_changes_nothing, a_signal_and_a_thread_can_cancel,
-      normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves, hosts_in_threads_share_a_model,
-      a_host_needs_no_memory)
+SUITE("host", pins_go_where_they_are_sent, velocities_make_a_motion_smooth, a_state_takes_moved_pins_along,
+      a_collider_goes_where_it_is_sent, reactions_carry_the_weight, observers_read_forces,
+      a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
+      contact_carries_the_weight, wind_takes_cloth_along, a_step_can_be_cancelled,
+      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, hosts_in_threads_share_a_model)

@@ -5,16 +5,7 @@
 #include "support/host.h"
 #include "support/suite.h"
 
-#define FRAME   (1.0 / 64) /* [s], exact in binary */
-#define GRAVITY 9.81
-
-/* A strip that hangs from its two upper nodes, with E h 1e4 N/m, no lateral contraction and 20 g; its lower
- * two nodes are 2 and 3. */
-#define STRIP                                                                                                \
-    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': 0.1, 'height': "   \
-    "0.5, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e7, 'poisson_ratio': 0, 'thickness': "  \
-    "1e-3, 'total_mass': 0.02}, 'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}]%s}], 'integrator': {%s}" \
-    ", 'frame_rate': 64, 'duration': 1}"
+#define FRAME (1.0 / 64) /* [s], exact in binary */
 
 #define TO_GROUND                                                                                            \
     "'integrator': {'dt': 0.0078125, 'tolerance': 1e-9, 'rtol': 1e-7}, 'frame_rate': 64, 'duration': 1}"
@@ -108,67 +99,6 @@ START_TEST(masses_from_structs)
 }
 END_TEST
 
-/* ---- Statics and periods ---- */
-
-/* The pins of a hanging strip carry its weight and the weights at its end: m g, to the tolerance of the solve
- * on four nodes. The extension d = m g L / (E h w) of a small strain d / L is that of the two lower nodes'
- * mass, with a relative error of about 3/2 of the strain for Green's strain; where these are unequal, that of
- * their mean. */
-START_TEST(a_strip_carries_its_weights)
-{
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, STRIP, ", 'masses': [{'edge': 'bottom', 'add': 0.05}]",
-                        "'method': 'static', 'tolerance': 1e-9");
-    double forces[12], up = 0;
-    advance(&h, 1);
-    good(&h, drape_sim_reactions(h.sim, forces));
-    for (int i = 0; i < 4; i++)
-        up += forces[3 * i + 1];
-    ck_assert_double_eq_tol(up, (0.02 + 0.1) * GRAVITY, 4e-9);
-    const double lower = masses_of(&h)[2] + masses_of(&h)[3], strain = lower * GRAVITY / (1e4 * 0.1);
-    ck_assert_double_eq_tol(lower, 0.11, 1e-15);
-    const double *x = drape_sim_positions(h.sim), mean = -(x[7] + x[10]) / 2 - 0.5;
-    ck_assert_double_eq_tol(mean, strain * 0.5, 2 * strain * strain * 0.5);
-    close_scene(&h, &memory);
-}
-END_TEST
-
-/* Starts from the present state at rest; returns the time until the lower nodes are at rest above again. */
-static double period(const host *h)
-{
-    const double start = drape_sim_time(h->sim), dt = 1.0 / 4096;
-    double before = 0;
-    for (int i = 1; i < 10000; i++) {
-        good(h, drape_sim_advance(h->sim, start + i * dt));
-        const double v = drape_sim_velocities(h->sim)[7];
-        if (before > 0 && v <= 0)
-            return (i - 1 + before / (before - v)) * dt;
-        before = v;
-    }
-    ck_abort_msg("it does not swing");
-}
-
-/* A strip that is let go from where it is not stretched swings with the period T = 2 pi sqrt(m L / (E h w));
- * four times the mass, given while it rests above, doubles it. With a strain s at most twice the static
- * 5e-4, the stiffness of Green's strain changes by 3 s, T by 0.2 %; the step h by (2 pi h / T)^2 / 24. */
-START_TEST(the_period_is_that_of_the_masses)
-{
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, STRIP, ", 'masses': [{'edge': 'bottom', 'mass': 0.025}]",
-                        "'method': 'midpoint', 'dt': 0.000244140625, 'tolerance': 1e-9");
-    const int32_t lower[] = {2, 3};
-    const double heavy[] = {0.1, 0.1}, first = 2 * acos(-1) * sqrt(0.05 / (1e4 * 0.1 / 0.5));
-    const double light = period(&h);
-    ck_assert_double_eq_tol(light, first, 3e-3 * first);
-    drape_sim_destroy(&h.sim);
-    good(&h, drape_sim_create(h.ctx, h.model, NULL, &h.sim));
-    good(&h, drape_sim_set_masses(h.sim, 2, lower, heavy));
-    ck_assert_double_eq(masses_of(&h)[2], 0.1);
-    ck_assert_double_eq_tol(period(&h), 2 * first, 6e-3 * 2 * first);
-    close_scene(&h, &memory);
-}
-END_TEST
-
 /* ---- A running sim ---- */
 
 /* Masses given by a call go on as the same masses from a scene: weights, inertia, the stiffness of contact;
@@ -243,30 +173,6 @@ START_TEST(velocities_stay_and_momentum_follows)
 }
 END_TEST
 
-/* Pins and other changes leave these masses, and masses leave pins; as compiled, the model is shared
- * again. */
-START_TEST(masses_and_pins_go_together)
-{
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, ON_BALL, "");
-    const int32_t heavy = 7, pin = 19;
-    const double mass = 0.02, former = drape_model_masses(h.model)[7];
-    good(&h, drape_sim_pin(h.sim, 1, &pin));
-    good(&h, drape_sim_set_masses(h.sim, 1, &heavy, &mass));
-    ck_assert_int_eq(drape_model_pinned(drape_sim_model(h.sim))[pin], 1);
-    good(&h, drape_sim_change_model(h.sim, h.model));
-    ck_assert_double_eq(masses_of(&h)[heavy], mass);
-    ck_assert_int_eq(drape_model_pinned(drape_sim_model(h.sim))[pin], 1);
-    good(&h, drape_sim_unpin(h.sim, 1, &pin));
-    ck_assert_double_eq(masses_of(&h)[heavy], mass);
-    advance(&h, 2 * FRAME);
-    good(&h, drape_sim_set_masses(h.sim, 1, &heavy, &former));
-    ck_assert_ptr_eq(drape_sim_model(h.sim), h.model);
-    advance(&h, 2 * FRAME);
-    close_scene(&h, &memory);
-}
-END_TEST
-
 /* Each allocation fails once: the sim is as it was, nothing leaks, and then the masses change. */
 START_TEST(masses_without_memory)
 {
@@ -291,6 +197,5 @@ START_TEST(masses_without_memory)
 }
 END_TEST
 
-SUITE("masses", masses_are_added_and_replaced, masses_from_structs, a_strip_carries_its_weights,
-      the_period_is_that_of_the_masses, a_call_does_what_a_scene_does, velocities_stay_and_momentum_follows,
-      masses_and_pins_go_together, masses_without_memory)
+SUITE("masses", masses_are_added_and_replaced, masses_from_structs, a_call_does_what_a_scene_does,
+      velocities_stay_and_momentum_follows, masses_without_memory)

@@ -1,6 +1,6 @@
 /* test_verbs.c: all functions that change, move or read a running sim, alike: wrong arguments are refused
- * with one line that names the function, and leave every byte of a checkpoint as it was; NULL in place of a
- * sim is refused; an observer may not change the sim, and may read all of it. */
+ * with one line that names the function, and leave every byte of a checkpoint as it was; an observer may
+ * not change the sim, and may read all of it. */
 #include <stdlib.h>
 
 #include "support/bytes.h"

@@ -1,7 +1,7 @@
 /*
  * test_rejection.c: a rejected step leaves no trace. The state after it is that before it to the bit; the
- * accepted steps fill their intervals exactly and are those of a run that never tried the others; every
- * attempt is reported once with its reason; and a run that cannot succeed ends.
+ * accepted steps are those of a run that never tried the others; and a run that cannot succeed ends. How
+ * steps fill their intervals is tested by entries/schedule.
  */
 #include <jansson.h>
 #include <unistd.h>
@@ -112,81 +112,6 @@ START_TEST(a_run_with_rejections_is_the_run_of_its_accepted_steps)
 END_TEST
 
 /*
- * Step ends are points of the binary subdivision of the interval; every k dt is one of them, and the size
- * is that of the part.
- */
-START_TEST(parts_fill_their_interval_exactly)
-{
-    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
-        int whole = 0;
-        double t = 0;
-        scene s = swinging(fixed_rows[k], "'type': 'halving'");
-        record *r = watch(&s);
-        scene_advance(&s, 2);
-        for (int i = 0; i < r->count; i++) {
-            ck_assert(r->attempt[i].t == t);
-            if (!r->attempt[i].accepted)
-                continue;
-            ck_assert(r->end[i] == t + r->attempt[i].h); /* exact in powers of two */
-            const double level = log2(STEP / r->attempt[i].h), place = r->end[i] / r->attempt[i].h;
-            ck_assert(level == floor(level) && level >= 0 && place == floor(place));
-            t = r->end[i];
-            whole += t / STEP == floor(t / STEP);
-        }
-        ck_assert(t == 2);
-        ck_assert_int_eq(whole, 16);
-        scene_close(&s);
-    }
-}
-END_TEST
-
-/* With times that are not sums of halves, all k dt are still met to the bit. */
-START_TEST(nominal_times_are_met_to_the_bit)
-{
-    const double dt = 0.15;
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
-    def.dt = dt;
-    scene s = swinging("be", "'type': 'halving'");
-    drape_sim_destroy(&s.sim);
-    scene_start(&s, &def);
-    record *r = watch(&s);
-    scene_advance(&s, 20 * dt);
-    ck_assert_int_gt(r->rejected, 0);
-    int met = 0;
-    for (int i = 0; i < r->count; i++)
-        met += r->attempt[i].accepted && r->end[i] == (met + 1) * dt;
-    ck_assert_int_eq(met, 20);
-    scene_close(&s);
-}
-END_TEST
-
-/*
- * A rejection halves the step. A success makes the next step at most twice as long, and does so as soon as
- * the step ends where one of twice the size would end.
- */
-START_TEST(sizes_are_halved_and_grow_back)
-{
-    int grown = 0;
-    scene s = swinging("be", "'type': 'halving'");
-    record *r = watch(&s);
-    scene_advance(&s, 2);
-    for (int i = 0; i + 1 < r->count; i++) {
-        const double h = r->attempt[i].h, next = r->attempt[i + 1].h, parts = r->end[i] / h;
-        if (!r->attempt[i].accepted) {
-            ck_assert(next == h / 2);
-            continue;
-        }
-        const bool even = fmod(parts, 2) == 0;
-        ck_assert(next == (even && h < STEP ? 2 * h : h));
-        grown += next > h;
-    }
-    ck_assert_int_gt(grown, 0);
-    scene_close(&s);
-}
-END_TEST
-
-/*
  * One node is moved onto its neighbour: every step that reaches it is too long, and the message must say
  * when, why and which edge.
  */
@@ -281,23 +206,6 @@ START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
         scene_close(&s);
         scene_close(&other);
     }
-}
-END_TEST
-
-/* A bound of one allows no step to be tried again, and a run without rejections does not reach it. */
-START_TEST(a_run_without_rejections_never_meets_the_bound)
-{
-    scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 1, 'height': "
-        "1},"
-        "'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
-        "'integrator': {'method': 'be', 'dt': 0.01}, 'duration': 1}");
-    s.sim->max_attempts = 1;
-    scene_advance(&s, 0.5);
-    scene_advance(&s, 0.503); /* a host may cut steps at any time */
-    scene_advance(&s, 1);
-    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 0);
-    scene_close(&s);
 }
 END_TEST
 
@@ -807,85 +715,6 @@ END_TEST
 
 /* ---- What is written ---- */
 
-static const char *file_in(const char *folder, const char *name)
-{
-    static char path[400];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
-static int count_rows(const char *path, int *rejected)
-{
-    char line[2000];
-    int rows = -1; /* the header */
-    FILE *file = fopen(path, "r");
-    ck_assert_ptr_nonnull(file);
-    *rejected = 0;
-    for (; fgets(line, sizeof line, file); rows++) {
-        int accepted = 1;
-        if (rows >= 0) {
-            ck_assert_int_eq(sscanf(line, "%*d,%*[^,],%*[^,],%d,", &accepted), 1);
-            *rejected += !accepted;
-        }
-    }
-    fclose(file);
-    return rows;
-}
-
-static void check_summary(const char *path, const record *r)
-{
-    const char *reason;
-    json_t *count;
-    long long counted = 0;
-    json_t *summary = json_load_file(path, 0, NULL), *steps = json_object_get(summary, "steps");
-    ck_assert_int_eq(json_integer_value(json_object_get(steps, "accepted")), r->accepted);
-    ck_assert_int_eq(json_integer_value(json_object_get(steps, "rejected")), r->rejected);
-    json_object_foreach(json_object_get(steps, "reasons"), reason, count)
-    {
-        long long seen = 0;
-        for (int i = 0; i < r->count; i++)
-            seen += !r->attempt[i].accepted && strcmp(r->attempt[i].reason, reason) == 0;
-        ck_assert_int_eq(json_integer_value(count), seen);
-        counted += seen;
-    }
-    ck_assert_int_eq(counted, r->rejected);
-    json_decref(summary);
-}
-
-START_TEST(every_attempt_is_one_row_one_call_and_one_reason)
-{
-    static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.01",
-                                              "'type': 'error'"};
-    const char *files[] = {"steps.csv", "summary.json"};
-    for (size_t k = 0; k < 3; k++) {
-        char folder[300];
-        int rejected;
-        const char *build = getenv("DRAPE_BUILD");
-        drape_recorder *recorder = NULL;
-        snprintf(folder, sizeof folder, "%s/rejection.XXXXXX", build ? build : "/tmp");
-        ck_assert_ptr_nonnull(mkdtemp(folder));
-        scene s = swinging("be", controllers[k]);
-        record *r = watch(&s);
-        const drape_recorder_def def = {.folder = folder};
-        ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
-        scene_advance(&s, 1);
-        ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-        ck_assert_int_eq(drape_summary_write(s.ctx, s.sim, &(drape_summary_def){.status = DRAPE_OK}, NULL,
-                                             file_in(folder, "summary.json")),
-                         DRAPE_OK);
-        ck_assert_int_gt(r->rejected, 0);
-        ck_assert_int_eq(count_rows(file_in(folder, "steps.csv"), &rejected), r->count);
-        ck_assert_int_eq(rejected, r->rejected);
-        check_summary(file_in(folder, "summary.json"), r);
-        drape_recorder_destroy(&recorder);
-        scene_close(&s);
-        for (size_t i = 0; i < 2; i++)
-            remove(file_in(folder, files[i]));
-        rmdir(folder);
-    }
-}
-END_TEST
-
 static void count_line(void *user, drape_log_level level, const char *text)
 {
     (void)level;
@@ -947,14 +776,12 @@ END_TEST
 SUITE("rejection", a_nan_residual_is_not_printed, the_message_of_an_earlier_failure_is_not_repeated,
       without_free_nodes_pins_move, ida_without_free_nodes_stops_at_kinks,
       the_error_controller_starts_at_tight_tolerances, a_run_with_rejections_is_the_run_of_its_accepted_steps,
-      parts_fill_their_interval_exactly, nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element,
-      a_bound_on_attempts_ends_the_advance_and_changes_no_bit, a_run_without_rejections_never_meets_the_bound,
-      a_residual_of_rounding_is_converged, strain_names_the_edge_or_the_node_that_went_too_far,
+      a_bound_on_attempts_ends_the_advance_and_changes_no_bit, a_residual_of_rounding_is_converged,
+      strain_names_the_edge_or_the_node_that_went_too_far,
       the_error_controller_never_tries_a_refused_size_again,
       an_estimate_that_is_not_a_number_is_refused_until_it_ends, kinetic_energy_from_nowhere_is_refused,
       a_slow_gain_is_no_runaway, a_slow_gain_ends_the_run_when_it_is_large,
       elastic_energy_from_nowhere_is_refused, a_jump_of_a_pin_is_no_energy_of_the_sheet,
       energy_that_a_term_answers_for_is_no_runaway, a_sheet_at_rest_stays_at_rest,
-      every_attempt_is_one_row_one_call_and_one_reason, a_rejection_is_one_line_of_the_hosts_log,
-      a_start_below_the_limit_is_left)
+      a_rejection_is_one_line_of_the_hosts_log, a_start_below_the_limit_is_left)

@@ -365,57 +365,5 @@ START_TEST(what_may_be_met_is_known)
 }
 END_TEST
 
-/* Colliders pass through sheets that stay where they are: all pairs are searched once, and then those of the
- * colliders alone, at whichever time; and those of a collider at rest if its activation distance has changed,
- * here to 3 cm for a floor that is 2 cm below a sheet of 30 nodes. */
-START_TEST(colliders_that_move_are_searched_alone)
-{
-    scene s =
-        scene_model("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2},"
-                    "'contact': {'distance': 1.5e-2}, 'duration': 1, 'colliders': ["
-                    "{'type': 'box', 'center': [0.1,0.05,-0.1], 'size': [0.1,0.06,0.1], 'rotate': [0,0,1,20],"
-                    " 'track': [[0,[0,0,0]], [1,[0.1,-0.2,0]]]},"
-                    "{'type': 'capsule', 'a': [0.1,-0.1,-0.3], 'b': [0.15,-0.1,0.3], 'radius': 0.02,"
-                    " 'track': [[0,[0,0,0]], [1,[0,0.3,0]]]},"
-                    "{'type': 'plane', 'point': [0,-0.02,0], 'normal': [0,1,0]}]%s}",
-                    "");
-    const drape_model *m = s.model;
-    drape_arena arena = drape_arena_of(s.ctx);
-    drape_motion *motion = NULL;
-    ck_assert_int_eq(drape_motion_create(&arena, m, &motion), DRAPE_OK);
-    drape_contact *c = open_contact(&arena, motion);
-    all_pairs all = list_all(&arena, c);
-    drape_active_contact *found = drape_arena_take(&arena, 40000, sizeof *found);
-    double *x = drape_arena_take(&arena, 3 * (size_t)m->node_count, sizeof *x);
-    ck_assert(found && x);
-    memcpy(x, m->rest, 3 * (size_t)m->node_count * sizeof *x);
-    for (int32_t i = m->cloths[1].first_node; i < m->node_count; i++)
-        x[3 * i + 1] += 0.015;
-    ck_assert_int_eq(drape_contact_begin(c, x, NULL, 0), DRAPE_OK);
-    const int32_t pairs = c->step_candidates.set[0].count;
-    int32_t least = INT32_MAX, most = 0;
-    for (int k = 0; k <= 40; k++) {
-        const double t = k % 2 ? 1 - k / 40.0 : k / 40.0;
-        ck_assert_int_eq(drape_contact_evaluate_at(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}}),
-                         DRAPE_OK);
-        check_active(&all, found);
-        ck_assert(c->step_candidates.set[0].count == pairs && (k == 0 || c->step_candidates.sets > 1));
-        least = c->active.count < least ? c->active.count : least;
-        most = c->active.count > most ? c->active.count : most;
-    }
-    ck_assert_int_gt(most, least + 10);
-    const int32_t before = c->active.count;
-    c->broad.distance[2] *= 2;
-    c->listed = false;
-    drape_candidates_forget_collider(&c->step_candidates, 2);
-    ck_assert_int_eq(drape_contact_evaluate_at(c, &(drape_contact_at){.x = x, .t = 1, .span = {1, 1}}),
-                     DRAPE_OK);
-    ck_assert_int_eq(c->active.count, before + 30);
-    ck_assert_int_eq(c->step_candidates.set[0].count, pairs);
-    drape_arena_free(&arena);
-    scene_close(&s);
-}
-END_TEST
-
 SUITE("broad_phase", everything_near_is_found, all_near_a_few_features_is_found,
-      edges_do_not_slide_into_bodies, what_may_be_met_is_known, colliders_that_move_are_searched_alone)
+      edges_do_not_slide_into_bodies, what_may_be_met_is_known)

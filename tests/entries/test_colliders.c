@@ -9,6 +9,7 @@
 #include "base/vec3.h"
 #include "entries/models.h"
 #include "mesh/mesh.h"
+#include "support/folder.h"
 #include "support/scene.h"
 
 #include <unistd.h>
@@ -124,23 +125,10 @@ static void write_wedge(const char *path)
 /* A temporary folder for the files of a test, with the meshes that the variants below name. */
 static void enter_folder(void)
 {
-    char folder[] = "/tmp/drape-colliders-XXXXXX";
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chdir(folder), 0);
+    folder_enter();
     write_cube("cube.obj", whole_cube);
     write_globe("globe.obj", 7, 0.2);
     write_wedge("wedge.obj");
-}
-
-static void leave_folder(void)
-{
-    char folder[256];
-    static const char *const files[] = {"cube.obj", "globe.obj", "wedge.obj", "wrong.obj", "large.obj"};
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
-        unlink(files[i]);
-    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
-    ck_assert_int_eq(chdir("/"), 0);
-    ck_assert_int_eq(rmdir(folder), 0);
 }
 
 /* ---- The variants ---- */
@@ -278,7 +266,7 @@ static void each_variant(visit *one)
         one(&s.model->colliders[0], &variants[i]);
         scene_close(&s);
     }
-    leave_folder();
+    folder_leave();
 }
 
 static double distance_of(const drape_collider *c, const double *x, double *normal, double *curvature)
@@ -355,33 +343,6 @@ static void check_distance(const drape_collider *c, const struct variant *v)
 START_TEST(distances_are_exact)
 {
     each_variant(check_distance);
-}
-END_TEST
-
-/* The mesh of a cube and the box of the same size have the same distance everywhere. */
-START_TEST(a_mesh_equals_its_box)
-{
-    enter_folder();
-    scene mesh = with_collider("{'type': 'mesh', 'file': 'cube.obj', 'scale': [1, 0.5, 0.8],"
-                               " 'rotate': [1, 1, 0, 40], 'translate': [0.1, 0, -0.1]}");
-    scene box = with_collider("{'type': 'box', 'center': [0.1, 0, -0.1], 'size': [1, 0.5, 0.8],"
-                              " 'rotate': [1, 1, 0, 40]}");
-    for (int i = 0; i < 20000; i++) {
-        double x[3], n[2][3], h[2][9];
-        for (int k = 0; k < 3; k++)
-            x[k] = between(-1.2, 1.2);
-        const double d = distance_of(&mesh.model->colliders[0], x, n[0], h[0]);
-        ck_assert_double_eq_tol(d, distance_of(&box.model->colliders[0], x, n[1], h[1]), 1e-14);
-        /* the normal changes by the rounding of the foot over the distance, the curvature by that over d
-         * again */
-        for (int k = 0; k < 9 && d > 1e-3; k++) {
-            ck_assert_double_eq_tol(h[0][k], h[1][k], 1e-14 / (d * d));
-            ck_assert_double_eq_tol(n[0][k % 3], n[1][k % 3], 1e-14 / d);
-        }
-    }
-    scene_close(&mesh);
-    scene_close(&box);
-    leave_folder();
 }
 END_TEST
 
@@ -588,7 +549,7 @@ START_TEST(shapes_have_the_right_features)
                       shape->radius);
         scene_close(&s);
     }
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 
@@ -630,7 +591,7 @@ START_TEST(meshes_that_are_no_solid_are_refused)
     refused(
         "{'type': 'mesh', 'file': 'cube.obj', 'translate': [1e9, 0, 0]}",
         "/colliders/0: node 1 is at (1e+09, -0.5, -0.5) m; coordinates must be finite and within 1e+09 m");
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 
@@ -806,39 +767,7 @@ START_TEST(swings_lead_from_pose_to_pose)
 }
 END_TEST
 
-/* ---- Speed ---- */
-
-/* A search through all of the 40 000 triangles takes some milliseconds. Near the surface, where contact
- * queries are made, the tree visits a few leaves: one or two microseconds. 50 are allowed, for slow
- * machines and sanitizers. */
-START_TEST(queries_of_large_meshes_are_fast)
-{
-    enum { QUERIES = 20000 };
-    double nearest = INFINITY;
-    enter_folder();
-    write_globe("large.obj", 100, 0.01);
-    scene s = with_collider("{'type': 'mesh', 'file': 'large.obj'}");
-    ck_assert_int_eq(s.model->colliders[0].shape.triangle_count, 40000);
-    const double start = drape_clock_cpu_seconds();
-    for (int i = 0; i < QUERIES; i++) {
-        double x[3], n[3];
-        for (int k = 0; k < 3; k++)
-            x[k] = between(-1, 1);
-        const double scale = between(0.95, 1.05) / vec3_norm(x);
-        for (int k = 0; k < 3; k++)
-            x[k] *= scale;
-        nearest = fmin(nearest, fabs(distance_of(&s.model->colliders[0], x, n, NULL)));
-    }
-    const double seconds = (drape_clock_cpu_seconds() - start) / QUERIES;
-    printf("# %.3g us a query of 40 000 triangles, nearest %g\n", 1e6 * seconds, nearest);
-    ck_assert_double_lt(seconds, 50e-6);
-    scene_close(&s);
-    leave_folder();
-}
-END_TEST
-
-SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_equals_its_box, derivatives_are_exact,
+SUITE("colliders", entries_are_well_formed, distances_are_exact, derivatives_are_exact,
       normals_are_continuous_outside, the_distance_is_defined_everywhere, shapes_lie_on_the_surface,
       shapes_have_the_right_features, meshes_that_are_no_solid_are_refused, poses_follow_the_track,
-      poses_follow_the_turns, a_turned_pose_turns_the_distance, swings_lead_from_pose_to_pose,
-      queries_of_large_meshes_are_fast)
+      poses_follow_the_turns, a_turned_pose_turns_the_distance, swings_lead_from_pose_to_pose)

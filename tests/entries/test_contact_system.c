@@ -6,6 +6,7 @@
 #include "contact/broad_phase.h"
 #include "contact/force.h"
 #include "entries/models.h"
+#include "support/folder.h"
 #include "support/sample.h"
 #include "support/scene.h"
 
@@ -232,28 +233,10 @@ static void check(probe *t, const char *what, double time)
     assert_below(still, 1e-5);
 }
 
-static void enter_folder(void)
-{
-    char folder[] = "/tmp/drape-contact-XXXXXX";
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chdir(folder), 0);
-    FILE *file = fopen("octahedron.obj", "w");
-    ck_assert_ptr_nonnull(file);
-    fputs(octahedron, file);
-    fclose(file);
-}
-
-static void leave_folder(void)
-{
-    char folder[256];
-    unlink("octahedron.obj");
-    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
-    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
-}
-
 START_TEST(every_collider)
 {
-    enter_folder();
+    folder_enter();
+    folder_write("octahedron.obj", octahedron);
     for (int i = 0; drape_colliders[i]; i++) {
         bool tried = false;
         for (size_t k = 0; k < SETTINGS; k++)
@@ -277,42 +260,7 @@ START_TEST(every_collider)
             check(&t, settings[i].text, 0.02);
             close_probe(&t);
         }
-    leave_folder();
-}
-END_TEST
-
-/* Contact couples the nodes of a triangle even where no term does: all terms here act on single nodes. A
- * second layer makes contact extend the pattern. */
-START_TEST(colliders_without_terms)
-{
-    static const char *const terms[] = {"[]", "[{'type': 'drag.viscous', 'coefficient': 0.1}]"};
-    enter_folder();
-    for (size_t i = 0; i < SETTINGS; i++)
-        for (int k = 0; k < 8; k++) {
-            if (!in_sample(i, (size_t)k, 3))
-                continue;
-            char layer[600] = "";
-            if (k / 4)
-                snprintf(
-                    layer, sizeof layer,
-                    ", {'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.3, 'height': 0.3,"
-                    " 'transform': {'translate': [-0.14, %g, 0.15]}},"
-                    " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': []}",
-                    settings[i].top + 5e-3);
-            scene s = scene_model(
-                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.3,"
-                " 'height': 0.3, 'transform': {'translate': [-0.147, %g, 0.155]}}, 'pins': [{'nodes': [3]}],"
-                " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': %s}%s],"
-                " 'colliders': [{%s, 'friction': 0.4}]%s,"
-                " 'contact': {'distance': 4e-3, 'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
-                settings[i].top + 2e-3, terms[k % 2], layer, settings[i].text,
-                k / 4 ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.4}" : "",
-                k / 2 % 2 ? "lagged" : "implicit");
-            probe t = open_probe(s, 0, 11 + i);
-            check(&t, settings[i].text, 0.02);
-            close_probe(&t);
-        }
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 
@@ -451,49 +399,6 @@ START_TEST(the_jacobian_has_the_predicted_forces)
 }
 END_TEST
 
-/* A sheet that lands flat is one gap to Newton's method, which in free fall needs one iteration a step: 26 in
- * these 19 steps, and 34 with the tangents of contact alone. Less than halfway between them counts. */
-START_TEST(landing_takes_few_iterations)
-{
-    scene s = scene_open(
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.5, 'height': "
-        "0.5, 'orientation': 'horizontal', 'transform': {'translate': [0, 0.2, 0]}}, 'velocity': [0,-2,0],"
-        " 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2},"
-        " 'terms': ['stretch.edge', 'bend.hinge']}],"
-        " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0]}],"
-        " 'contact': {'distance': 5e-3}, 'integrator': {'method': 'be', 'dt': 0.016666}, 'duration': 1}");
-    scene_advance(&s, 0.3);
-    assert_below((double)drape_sim_statistics(s.sim).newton_iterations, 29);
-    scene_close(&s);
-}
-END_TEST
-
-/* A correction that throws a node farther than the size of the scene is of no use, and to look at all
- * pairs that nodes meet on such a path takes far longer than the rest of an iteration: it is cut to about
- * an edge, of 0.075 to 0.107 m here. A motion of all nodes alike is not. */
-START_TEST(a_thrown_node_is_stopped)
-{
-    probe t = open_flat(1);
-    const size_t nodes = (size_t)t.s.model->node_count;
-    double *fraction = calloc(nodes, sizeof *fraction);
-    ck_assert_ptr_nonnull(fraction);
-    for (size_t i = 0; i < 3 * nodes; i++)
-        t.x[i] = t.at.x[i] + (i % 3 == 1 ? 10 : 0);
-    ck_assert_double_eq(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL), 1);
-    t.x[1] = t.at.x[1] + 1e6;
-    const double whole = 1e6 * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL);
-    ck_assert_double_lt(whole, 0.107 * 1.1); /* beyond the mean of all nodes, of which it is one */
-    ck_assert_double_gt(whole, 0.075);
-    for (size_t i = 0; i < nodes; i++)
-        fraction[i] = 1;
-    drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, fraction);
-    ck_assert_double_lt(1e6 * fraction[0], 0.107);
-    ck_assert_double_gt(1e6 * fraction[0], 0.075);
-    free(fraction);
-    close_probe(&t);
-}
-END_TEST
-
 /* Whoever cancels need not wait until all pairs have been looked at: nothing moves, which is always safe. */
 START_TEST(a_cancelled_search_moves_nothing)
 {
@@ -577,68 +482,6 @@ START_TEST(only_scenes_with_contact_have_it_checked)
         ck_assert_int_eq(self, k == 2 ? 2 : 0);
         scene_close(&s);
     }
-}
-END_TEST
-
-/* A sheet of 0.8 m as an OBJ file: nodes off the points of a grid by so much of a cell and off the plane by
- * 2e-4 m at most, diagonals in either direction. */
-static void draw_sheet(const char *path, double jitter, uint64_t seed)
-{
-    enum { SIDE = 24 };
-    FILE *file = fopen(path, "w");
-    ck_assert_ptr_nonnull(file);
-    for (int i = 0; i < SIDE * SIDE; i++) {
-        const bool inner = i % SIDE > 0 && i % SIDE < SIDE - 1 && i / SIDE > 0 && i / SIDE < SIDE - 1;
-        const double dx = random_number(&seed), dz = random_number(&seed), y = random_number(&seed);
-        fprintf(file, "v %.17g %.17g %.17g\n", 0.8 / (SIDE - 1) * (i % SIDE + (inner ? jitter * dx : 0)),
-                2e-4 * y, 0.8 / (SIDE - 1) * (i / SIDE + (inner ? jitter * dz : 0)));
-    }
-    for (int i = 0; i < SIDE * (SIDE - 1); i++) {
-        const int a = i + 1, b = a + 1, c = a + SIDE, d = c + 1; /* from 1 on */
-        if (i % SIDE == SIDE - 1)
-            continue;
-        if (random_number(&seed) > 0)
-            fprintf(file, "f %d %d %d\nf %d %d %d\n", a, c, b, b, c, d);
-        else
-            fprintf(file, "f %d %d %d\nf %d %d %d\n", a, c, d, a, d, b);
-    }
-    fclose(file);
-}
-
-/* A folded sheet with bumps has thousands of pairs: some are nearer to the switch from one pair of closest
- * features to another than the steps of differences, and in some, of nearly parallel edges, the derivatives
- * change over 1e-8 m. All are exact there, too. */
-START_TEST(drawn_sheets_pass)
-{
-    static const struct {
-        double jitter, friction;
-        uint64_t seed;
-    } sheets[] = {{0, 0, 6}, {0, 0, 26}, {0, 0.3, 26}, {0.1, 0.3, 1}, {0.2, 0.3, 2}, {0.3, 0.3, 3}};
-    static drape_check_result found[DRAPE_MAX_CHECK_RESULTS];
-    enter_folder();
-    for (size_t k = 0; k < sizeof sheets / sizeof *sheets; k++) {
-        draw_sheet("sheet.obj", sheets[k].jitter, sheets[k].seed);
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'file': 'sheet.obj'}, 'material': {'young_modulus': 1e6,"
-            " 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst']}],"
-            " 'self_contact': {'thickness': 2e-3, 'friction': %g}, 'contact': {'distance': 4e-3},"
-            " 'colliders': [{'type': 'sphere', 'center': [0,0,0], 'radius': 0.3, 'friction': 0.3}],"
-            " 'duration': 1}",
-            sheets[k].friction);
-        for (unsigned seed = 2; seed <= 4; seed += 2) {
-            int count = 0, self = 0;
-            ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, seed, found, &count), DRAPE_OK);
-            for (int i = 0; i < count; i++) {
-                ck_assert_msg(found[i].pass, "sheet %d, seed %u: %s %s: %g", (int)k, seed, found[i].term,
-                              found[i].what, found[i].error);
-                self += strcmp(found[i].term, "self_contact") == 0 && found[i].error > 0;
-            }
-            ck_assert_int_eq(self, 2);
-        }
-        scene_close(&s);
-    }
-    unlink("sheet.obj");
-    leave_folder();
 }
 END_TEST
 
@@ -834,9 +677,8 @@ START_TEST(queries_change_nothing)
 }
 END_TEST
 
-SUITE("contact_system", every_collider, colliders_without_terms, cloth_on_cloth, near_the_least_gap,
-      a_correction_arrives_from_beyond_the_distance, a_thrown_node_is_stopped,
-      a_cancelled_search_moves_nothing, the_jacobian_has_the_predicted_forces, landing_takes_few_iterations,
-      nan_is_forgotten, only_scenes_with_contact_have_it_checked, drawn_sheets_pass,
+SUITE("contact_system", every_collider, cloth_on_cloth, near_the_least_gap,
+      a_correction_arrives_from_beyond_the_distance, a_cancelled_search_moves_nothing,
+      the_jacobian_has_the_predicted_forces, nan_is_forgotten, only_scenes_with_contact_have_it_checked,
       scenes_without_contact_pay_nothing, all_bytes_are_counted, active_contacts_are_all_pairs,
       queries_change_nothing)

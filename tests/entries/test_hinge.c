@@ -117,22 +117,6 @@ START_TEST(folds_through_pi_smoothly)
 }
 END_TEST
 
-/* Why the test above needs the internal variable: with the rest angle as the reference the branch changes at
- * pi. */
-START_TEST(the_bare_angle_would_jump)
-{
-    hinge h = make_hinge(0, "mesh");
-    double g[12], below = energy_at(&h, pi - 0.01, g), force_below = g[10] * cos(pi - 0.01);
-    double above = energy_at(&h, pi + 0.01, g), force_above = g[10] * cos(pi + 0.01);
-    ck_assert_double_eq_tol(above, below, 1e-12);      /* both (pi - 0.01)^2, folded in opposite directions */
-    ck_assert_double_lt(force_above * force_below, 0); /* and the force has changed its sign */
-    accept_angle(&h, pi - 0.01);
-    ck_assert_double_gt(energy_at(&h, pi + 0.01, g), below);
-    ck_assert_double_gt(g[10] * cos(pi + 0.01) * force_below, 0);
-    free_hinge(&h);
-}
-END_TEST
-
 /* A trial that is not accepted does not change the internal variable. */
 START_TEST(only_accepted_states_count)
 {
@@ -403,7 +387,7 @@ START_TEST(the_message_names_the_element)
 }
 END_TEST
 
-SUITE("hinge", folds_through_pi_smoothly, the_bare_angle_would_jump, only_accepted_states_count,
-      rest_angles_of_the_mesh_or_flat, a_collapsed_altitude_is_reported, a_collapsed_edge_is_reported,
+SUITE("hinge", folds_through_pi_smoothly, only_accepted_states_count, rest_angles_of_the_mesh_or_flat,
+      a_collapsed_altitude_is_reported, a_collapsed_edge_is_reported,
       what_was_degenerate_must_not_become_worse, a_turn_that_is_too_large_is_reported,
       the_message_names_the_element)

@@ -205,25 +205,6 @@ START_TEST(random_systems_are_solved)
 }
 END_TEST
 
-START_TEST(several_right_hand_sides_of_one_factorisation)
-{
-    problem q = open_problem();
-    for (int i = 0; drape_linears[i]; i++) {
-        const drape_linear_ops *ops = drape_linears[i];
-        void *solver = open_solver(&q, ops);
-        fill(&q, INDEFINITE, 3);
-        check_solution(&q, ops, solver, "first");
-        double first = q.x[0];
-        for (size_t k = 0; k < q.n; k++)
-            q.b[k] *= -2;
-        ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
-        ck_assert_double_eq(q.x[0], -2 * first);
-        drape_linear_destroy(ops, &solver);
-    }
-    close_problem(&q);
-}
-END_TEST
-
 static void clear_column(problem *q, int64_t c)
 {
     for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
@@ -636,29 +617,6 @@ START_TEST(no_memory_for_other_matrices)
 }
 END_TEST
 
-/* As when contact changes the sparsity: destroyed and created again on patterns that grow and shrink. */
-START_TEST(made_again_on_other_patterns)
-{
-    static const int32_t sides[] = {3, 15, 4, 20, 3, 15};
-    for (int i = 0; drape_linears[i]; i++) {
-        const drape_linear_ops *ops = drape_linears[i];
-        for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
-            sheet q = open_sheet(sides[k]);
-            void *solver = NULL;
-            ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
-            if (k % 3 != 2) { /* and once without a factorisation */
-                fill_sheet(&q, k % 2 ? 0.2 : 1.01, 9);
-                ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
-                ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
-                check_residual(&q, k % 2 == 0, ops->entry.name);
-            }
-            drape_linear_destroy(ops, &solver);
-            close_sheet(&q);
-        }
-    }
-}
-END_TEST
-
 /* The solver with the largest best_from that is not above the size; klu below all others. */
 START_TEST(auto_chooses_by_size_and_reports_it)
 {
@@ -698,9 +656,6 @@ typedef enum hard_kind {
     NEARLY_SINGULAR, /* condition number 1e12 */
     HARD_COUNT
 } hard_kind;
-static const char *const hard_names[] = {"saddle",    "negative",     "rotated",
-                                         "convected", "badly scaled", "nearly singular"};
-
 static void fill_hard(sheet *q, hard_kind kind)
 {
     fill_sheet(q, kind == NEARLY_SINGULAR ? 1.0 : 1.01, 11);
@@ -735,38 +690,6 @@ static void fill_laplacian(sheet *q, double shift)
                                                                      : 0;
     }
 }
-
-/* multifrontal bounds |A x - b| by 1e-13 (|x| + |b|) in the maximum norm of the scaled matrix. A row whose
- * terms are a thousandth of the largest component or more, as all are here, is then within 1e-10 of its
- * terms. Each kind with 1, 2 and 3 threads: the same bits. */
-START_TEST(hard_matrices_by_multifrontal)
-{
-    const drape_linear_ops *ops = multifrontal();
-    sheet q = open_sheet(20);
-    void *solver = NULL;
-    ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
-    for (int threads = 1; threads <= 3; threads++) {
-        drape_pool *pool = NULL;
-        ck_assert_int_eq(drape_pool_create(q.arena, threads, &pool), DRAPE_OK);
-        ops->use_threads(solver, pool);
-        for (int kind = 0; kind < HARD_COUNT; kind++) {
-            static double first[HARD_COUNT][3 * 20 * 20];
-            fill_hard(&q, kind);
-            ck_assert_msg(ops->factor(solver, q.values) == DRAPE_OK, "%s", hard_names[kind]);
-            ck_assert_msg(ops->solve(solver, q.b, q.x) == DRAPE_OK, "%s", hard_names[kind]);
-            const double error = backward_error(&q);
-            ck_assert_msg(error < 1e-10, "%s: a row of A x - b is %g of its terms", hard_names[kind], error);
-            if (threads == 1)
-                memcpy(first[kind], q.x, sizeof first[kind]);
-            ck_assert_mem_eq(first[kind], q.x, sizeof first[kind]);
-        }
-        ops->use_threads(solver, NULL);
-        drape_pool_destroy(&pool);
-    }
-    drape_linear_destroy(ops, &solver);
-    close_sheet(&q);
-}
-END_TEST
 
 /* The Laplacian itself is singular: it is refused, or, if rounding errors hide that, gets a solution within
  * the bound. A shift of -1e-11 moves its three eigenvalues 0 to about -1e-11 of the largest; a larger one
@@ -1017,11 +940,10 @@ START_TEST(equal_patterns_share_an_order)
 END_TEST
 
 SUITE("linears", entries_are_well_formed, equal_patterns_share_an_order, random_systems_are_solved,
-      several_right_hand_sides_of_one_factorisation, broken_matrices_are_reported_and_good_ones_work_again,
-      a_right_hand_side_that_is_not_finite_is_reported, kept_pivots_that_become_zero_are_chosen_again,
-      a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted,
-      iterative_solvers_refuse_indefinite_matrices_if_asked, a_sheet_of_many_supernodes,
-      threads_give_the_same_bits, no_memory_for_other_matrices, made_again_on_other_patterns,
-      hard_matrices_by_multifrontal, a_singular_matrix_is_refused_and_a_nearly_singular_one_solved,
-      negative_eigenvalues_are_counted, a_factorisation_can_be_cancelled, the_best_solver_of_no_unknowns,
-      auto_chooses_by_size_and_reports_it, the_symmetric_part_is_exact, a_nearby_matrix_is_corrected)
+      broken_matrices_are_reported_and_good_ones_work_again, a_right_hand_side_that_is_not_finite_is_reported,
+      kept_pivots_that_become_zero_are_chosen_again, a_small_part_that_is_not_symmetric_is_not_lost,
+      fallbacks_are_counted, iterative_solvers_refuse_indefinite_matrices_if_asked,
+      a_sheet_of_many_supernodes, threads_give_the_same_bits, no_memory_for_other_matrices,
+      a_singular_matrix_is_refused_and_a_nearly_singular_one_solved, negative_eigenvalues_are_counted,
+      a_factorisation_can_be_cancelled, the_best_solver_of_no_unknowns, auto_chooses_by_size_and_reports_it,
+      the_symmetric_part_is_exact, a_nearby_matrix_is_corrected)

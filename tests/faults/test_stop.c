@@ -99,12 +99,6 @@ START_TEST(stops_at_a_step_and_goes_on)
 }
 END_TEST
 
-START_TEST(stops_at_a_step_between_frames_and_goes_on)
-{
-    check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 370); /* several frames a step */
-}
-END_TEST
-
 START_TEST(stops_at_a_frame_and_goes_on)
 {
     check_stops(DRAPE_EVENT_FRAME, 0.01, 60);
@@ -245,36 +239,6 @@ START_TEST(every_integrator_stops_at_a_time_and_continues)
 }
 END_TEST
 
-/* A host stops at a time by ending its advance there: every integrator ends at exactly that time. */
-START_TEST(an_advance_ends_at_its_time_exactly)
-{
-    for (int i = 0; drape_integrators[i]; i++) {
-        timer never = {.stop = NAN};
-        scene s = open_integrator(drape_integrators[i]->entry.name, "halving", "", &never);
-        for (double t = 0.0123; t < 0.2; t *= 1.7) {
-            scene_advance(&s, t);
-            ck_assert_double_eq(drape_sim_time(s.sim), t);
-        }
-        scene_close(&s);
-    }
-}
-END_TEST
-
-/* The equilibrium is a single step: after a stop there, nothing is left to do. */
-START_TEST(a_row_without_time_stops_at_its_equilibrium)
-{
-    timer w = {.stop = 0.1};
-    scene s = open_integrator("static", "halving", "", &w);
-    ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
-    ck_assert_double_eq(drape_sim_time(s.sim), END);
-    ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
-    scene_advance(&s, END);
-    ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
-    scene_close(&s);
-}
-END_TEST
-
-SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_step_between_frames_and_goes_on,
-      stops_at_a_frame_and_goes_on, a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
-      observers_are_notified_in_order, every_integrator_stops_at_a_time_and_continues,
-      an_advance_ends_at_its_time_exactly, a_row_without_time_stops_at_its_equilibrium)
+SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_frame_and_goes_on,
+      a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
+      observers_are_notified_in_order, every_integrator_stops_at_a_time_and_continues)

@@ -12,8 +12,6 @@
 #include "mesh/mesh.h"
 #include "support/scene.h"
 
-#define PI 3.14159265358979323846
-
 #define MODULUS   1e3 /* [Pa]; soft and thick: rounding of the membrane is below the hinge forces */
 #define THICKNESS 0.1
 #define DENSITY   0.2 /* per area */

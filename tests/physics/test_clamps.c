@@ -136,6 +136,5 @@ START_TEST(derivatives_while_clamps_turn)
 }
 END_TEST
 
-SUITE("clamps", a_strip_turns_with_its_clamp,
-      the_work_of_clamps_that_turn_is_in_the_balance, dashpots_at_clamps_feel_their_turning,
-      yarns_slip_while_clamps_turn, derivatives_while_clamps_turn)
+SUITE("clamps", a_strip_turns_with_its_clamp, the_work_of_clamps_that_turn_is_in_the_balance,
+      dashpots_at_clamps_feel_their_turning, yarns_slip_while_clamps_turn, derivatives_while_clamps_turn)

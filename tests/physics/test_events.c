@@ -132,31 +132,6 @@ START_TEST(recorded_events_are_located_on_dense_output)
 }
 END_TEST
 
-/* Thrown up at v, the center turns at v^2/2g; a height 1e-9 m below that is passed twice, in 2 sqrt(2e-9/g)
- * = 29 us, within one part of a step of 10 ms between evaluations. */
-START_TEST(a_height_is_passed_twice_in_a_step)
-{
-    const double v = 1, top = v * v / (2 * GRAVITY), half = sqrt(2e-9 / GRAVITY);
-    char event[160];
-    snprintf(event, sizeof event, "{'type': 'height', 'of': 'center', 'height': %.17g}", top - 1e-9);
-    for (int i = 0; method(i); i++) {
-        const char *name = method(i)->entry.name;
-        if (!is_exact(name) || method(i)->own_steps)
-            continue;
-        scene s = fall(name, "[0, 1, 0]", event);
-        scene_advance(&s, 0.3);
-        const drape_watch *w = &s.sim->events.watches[0];
-        ck_assert_msg(w->count == 2, "%s: passed %lld times", name, (long long)w->count);
-        ck_assert(w->first[0].direction == 1 && w->first[1].direction == -1);
-        /* y is rounded to 1e-16 of some 0.1 m, its distance from the top by twice that: 2e-16 m at 1.4e-4 m/s
-         * are 2e-12 s; the sums of the steps add as much */
-        ck_assert_double_eq_tol(w->first[0].t, v / GRAVITY - half, PROMISE);
-        ck_assert_double_eq_tol(w->first[1].t, v / GRAVITY + half, PROMISE);
-        scene_close(&s);
-    }
-}
-END_TEST
-
 /* ---- A swinging, pulled sheet above a floor ---- */
 
 /* The sheet is pinned at two corners, one of which is pulled away, and falls on a plane. */
@@ -254,104 +229,11 @@ START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
 }
 END_TEST
 
-static drape_status clock_of(void *user, double t, const double *x, const double *v, double *value)
-{
-    (void)x, (void)v;
-    *value = t - *(const double *)user;
-    return DRAPE_OK;
-}
-
-/* A step that is to end very soon after it begins can be made, in contact and with damping; if it would be
- * shorter than what events are located to, the event is where the step begins. */
-START_TEST(an_event_may_follow_a_step_closely)
-{
-    static const double after[] = {1e-6, 1e-8, 1e-9, 1e-10, 3e-11, 5e-12};
-    for (int i = 0; method(i); i++) {
-        const char *name = method(i)->entry.name;
-        scene before = swing(name, "");
-        scene_advance(&before, 0.4);
-        bytes saved = bytes_save(before.sim);
-        scene_close(&before);
-        for (size_t k = 0; k < sizeof after / sizeof *after; k++) {
-            scene s = swing(name, "");
-            drape_event_def def;
-            drape_event_def_init(&def, sizeof def);
-            def.name = "clock";
-            def.action = "stop";
-            ck_assert_int_eq(drape_sim_restore_from(s.sim, saved.data, saved.size), DRAPE_OK);
-            double at = drape_sim_time(s.sim) + after[k];
-            ck_assert_int_eq(drape_sim_add_event(s.sim, &def, clock_of, &at), DRAPE_OK);
-            ck_assert_msg(drape_sim_advance(s.sim, 0.5) == DRAPE_E_STOPPED, "%s %g: %s", name, after[k],
-                          drape_context_message(s.ctx));
-            ck_assert_msg(fabs(drape_sim_time(s.sim) - at) <= 1e-11, "%s %g: %g", name, after[k],
-                          drape_sim_time(s.sim) - at);
-            ck_assert_msg(drape_sim_advance(s.sim, 0.45) == DRAPE_OK, "%s %g: %s", name, after[k],
-                          drape_context_message(s.ctx));
-            scene_close(&s);
-        }
-        free(saved.data);
-    }
-}
-END_TEST
-
-/* ---- Dense output ---- */
-
-#define FRAMES   20000 /* a second */
-#define DISTANCE (1.0 / FRAMES)
-
 typedef struct film {
     double x[3][75], v[75]; /* the last three frames, and the velocities of the one in the middle */
     int64_t count;
     double worst, fastest;
 } film;
-
-/* Compares the velocities of a frame with the difference of the frames around it. */
-static drape_status compare(void *user, const drape_event *event)
-{
-    film *f = user;
-    if (event->kind != DRAPE_EVENT_FRAME)
-        return DRAPE_OK;
-    memmove(f->x[0], f->x[1], 2 * sizeof *f->x);
-    memcpy(f->x[2], event->positions, sizeof *f->x);
-    for (size_t i = 0; f->count >= 2 && i < 75; i++) {
-        const double slope = (f->x[2][i] - f->x[0][i]) / (2 * DISTANCE);
-        f->worst = fmax(f->worst, fabs(slope - f->v[i]));
-        f->fastest = fmax(f->fastest, fabs(slope));
-    }
-    memcpy(f->v, event->velocities, sizeof f->v);
-    f->count++;
-    return DRAPE_OK;
-}
-
-/* Frames are far closer, 50 us, than the steps of a method of high order, 2 ms. With its own velocities
- * between steps, these and the difference of frames agree to what the tolerance, 1e-7, leaves: 1e-5 of 3 m/s
- * for most, more where the polynomials of two steps meet at an angle. Linear velocities would be off by (w
- * h)^2/8 = 4e-4 of that for the oscillations that the fall excites, w = 30/s, and more for faster ones. */
-START_TEST(own_velocities_belong_to_the_motion)
-{
-    int checked = 0;
-    for (int i = 0; method(i); i++) {
-        if (!method(i)->interpolate_velocities)
-            continue;
-        const char *name = method(i)->entry.name;
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4,"
-            "   'height': 0.4}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
-            " 'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'corner': 'top-left'}]}],"
-            " 'integrator': {'method': '%s', 'rtol': 1e-7}, 'frame_rate': %d, 'duration': 1}",
-            name, FRAMES);
-        film f = {.count = 0};
-        ck_assert_int_eq(drape_sim_observe(s.sim, compare, &f), DRAPE_OK);
-        scene_advance(&s, 0.3);
-        printf("# %s: %g of %g m/s, %lld steps\n", name, f.worst, f.fastest,
-               (long long)drape_sim_statistics(s.sim).steps_accepted);
-        ck_assert_double_le(f.worst, 2e-4 * f.fastest);
-        scene_close(&s);
-        checked++;
-    }
-    ck_assert_int_ge(checked, 1);
-}
-END_TEST
 
 /* ---- Checkpoints ---- */
 
@@ -511,29 +393,6 @@ START_TEST(a_sheet_that_is_let_go_falls)
 }
 END_TEST
 
-/* total + dissipated + numerical is what it was: the released node brings in its kinetic energy, counted as
- * given, and no method gains any at the release. The other pin stays on the path on which a host sent it. */
-START_TEST(a_release_gives_no_energy)
-{
-    scene s = hung("midpoint", both, tears);
-    double numerical = 0;
-    const int32_t held = s.model->pins[0].node[0];
-    const double *rest = s.model->rest + 3 * (size_t)held, to[3] = {rest[0], rest[1] + 0.05, rest[2]};
-    ck_assert_int_eq(drape_sim_move_pins(s.sim, 1, &held, 0.5, to, NULL), DRAPE_OK);
-    for (int i = 1; i <= 50; i++) {
-        scene_advance(&s, 0.01 * i);
-        const drape_energy e = drape_sim_energy(s.sim);
-        if (drape_sim_model(s.sim) != s.model)
-            /* what midpoint's energy oscillates by, some per cent of the energy that went in: 0.05 J */
-            ck_assert_double_le(fabs(e.numerical - numerical), 2e-3);
-        numerical = e.numerical;
-    }
-    ck_assert_ptr_ne(drape_sim_model(s.sim), s.model);
-    ck_assert_mem_eq(drape_sim_positions(s.sim) + 3 * (size_t)held, to, sizeof to);
-    scene_close(&s);
-}
-END_TEST
-
 static const char falls[] =
     "{'type': 'height', 'height': -0.1, 'node': 22, 'action': 'release', 'pins': 'held'},"
     "{'type': 'energy', 'bound': 0.02}";
@@ -577,7 +436,6 @@ START_TEST(a_release_is_in_checkpoints)
 END_TEST
 
 SUITE("events", free_fall_stops_at_its_height, an_event_is_recorded_where_another_stops,
-      recorded_events_are_located_on_dense_output, a_height_is_passed_twice_in_a_step,
-      recording_changes_no_bit, a_stop_is_a_state_of_the_run_at_the_root, own_velocities_belong_to_the_motion,
-      an_event_may_follow_a_step_closely, a_restored_sim_has_the_same_events, a_released_pin_is_gone,
-      a_sheet_that_is_let_go_falls, a_release_gives_no_energy, a_release_is_in_checkpoints)
+      recorded_events_are_located_on_dense_output, recording_changes_no_bit,
+      a_stop_is_a_state_of_the_run_at_the_root, a_restored_sim_has_the_same_events, a_released_pin_is_gone,
+      a_sheet_that_is_let_go_falls, a_release_is_in_checkpoints)

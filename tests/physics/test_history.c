@@ -197,30 +197,6 @@ START_TEST(an_equilibrium_has_the_load_of_its_time)
 }
 END_TEST
 
-/* Gravity that a history makes a thousand times smaller is solved for as gravity of that size is: both runs
- * end with residuals below 3e-4 of the same load, of which each may bend the strip by as much. */
-START_TEST(little_gravity_is_felt)
-{
-    double tip[2];
-    for (int i = 0; i < 2; i++) {
-        scene s = scene_open(
-            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 1, "
-            "'height': "
-            "1}, 'material': {'young_modulus': 1e8, 'thickness': 1e-3, 'density': 200}, 'terms': "
-            "['stretch.cst', 'bend.midedge'], 'pins': [{'edge': 'left', 'clamp': true}]}], 'integrator': "
-            "{'method': 'static', 'dt': 0.02}, %s, 'duration': 1}",
-            i ? "'gravity': [0, -9.81e-3, 0]"
-              : "'gravity': [0, -9.81, 0], 'gravity_history': 'h', 'histories': [{'name': 'h', 'times': [0], "
-                "'values': [1e-3]}]");
-        scene_advance(&s, 1);
-        tip[i] = scene_state(&s)->x[3 * 24 + 1];
-        scene_close(&s);
-    }
-    ck_assert_double_lt(tip[1], -0.01);
-    assert_below(fabs(tip[0] - tip[1]), 2 * 3e-4 * fabs(tip[1]));
-}
-END_TEST
-
 /* ---- Jumps ---- */
 
 /* A free sheet at rest, whose gravity g = 10 is switched on within 1 ns before the end of a step of h = 5 ms.
@@ -310,5 +286,4 @@ END_TEST
 
 SUITE("history", factors_are_those_of_the_keys, a_history_multiplies_every_load,
       gravity_with_a_history_adds_up_to_its_impulse, steps_end_at_kinks, the_energy_account_closes,
-      an_equilibrium_has_the_load_of_its_time, little_gravity_is_felt,
-      a_jump_at_the_end_of_a_step_is_no_error, histories_of_a_host)
+      an_equilibrium_has_the_load_of_its_time, a_jump_at_the_end_of_a_step_is_no_error, histories_of_a_host)

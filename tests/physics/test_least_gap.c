@@ -8,32 +8,13 @@
 #include "contact/parts.h"
 #include "support/bytes.h"
 #include "support/crossings.h"
+#include "support/folder.h"
 #include "support/scene.h"
 
 #include <stdlib.h>
-#include <unistd.h>
 
 static const char tetrahedron[] = "v 0.3 -0.5 0\nv -0.15 -0.5 0.26\nv -0.15 -0.5 -0.26\nv 0.013 0 0.017\n"
                                   "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n";
-
-static void enter_folder(void)
-{
-    char folder[] = "/tmp/drape-gap-XXXXXX";
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chdir(folder), 0);
-    FILE *file = fopen("tip.obj", "w");
-    ck_assert_ptr_nonnull(file);
-    fputs(tetrahedron, file);
-    fclose(file);
-}
-
-static void leave_folder(void)
-{
-    char folder[256];
-    unlink("tip.obj");
-    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
-    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
-}
 
 #define MATERIAL "'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.1}"
 #define TERMS    "'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 1e-3}"
@@ -51,7 +32,8 @@ static const char *method_of(const char *name, double dt)
  * thousandth of it. */
 START_TEST(stiffening_is_work)
 {
-    enter_folder();
+    folder_enter();
+    folder_write("tip.obj", tetrahedron);
     scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, "
                          "'width': 0.4, 'height': 0.4,"
                          " 'transform': {'translate': [-0.2, 0.01, 0.2]}}, 'pins': [{'nodes': [0, 1, 2, 3, "
@@ -76,7 +58,7 @@ START_TEST(stiffening_is_work)
     ck_assert_int_ge(raised, 2);
     assert_below(fall, 1e-3 * added);
     scene_close(&s);
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 
@@ -177,7 +159,8 @@ END_TEST
  * than the scene says, and while cloth is inside. */
 START_TEST(a_checkpoint_keeps_it)
 {
-    enter_folder();
+    folder_enter();
+    folder_write("tip.obj", tetrahedron);
     for (int inside = 0; inside < 2; inside++) {
         uint64_t hash[2];
         scene s[2];
@@ -204,7 +187,7 @@ START_TEST(a_checkpoint_keeps_it)
         }
         ck_assert_uint_eq(hash[0], hash[1]);
     }
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 
@@ -262,7 +245,8 @@ static const char *wringing(double degrees)
 START_TEST(wrung)
 {
     static const char *const some[] = {"be", "newton_k"};
-    enter_folder();
+    folder_enter();
+    folder_write("tip.obj", tetrahedron);
     write_tube();
     for (int k = 0; k < 2; k++) {
         crossings_run run = {0};
@@ -276,8 +260,7 @@ START_TEST(wrung)
         ck_assert_msg(run.crossed_states + run.crossed_frames == 0, "%s: %s", some[k], run.first);
         scene_close(&s);
     }
-    unlink("tube.obj");
-    leave_folder();
+    folder_leave();
 }
 END_TEST
 

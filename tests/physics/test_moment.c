@@ -1,8 +1,7 @@
-/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up into a
- * circle. */
+/* test_moment.c: the potential of load.moment against quaternions. A strip that it winds up is a reference of
+ * `drape validate`: end_moment. */
 #include "support/scene.h"
 
-#define PI     3.14159265358979323846
 #define MOMENT 0.3 /* [N m/m] */
 #define SIDE   0.8 /* [m] */
 

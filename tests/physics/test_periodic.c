@@ -101,17 +101,6 @@ START_TEST(one_cell_moves_as_each_of_three)
 }
 END_TEST
 
-/* The same with springs along the edge and bending across it, which holds the sheet up by half. */
-START_TEST(one_cell_bends_as_each_of_three)
-{
-    static const char *const terms[] = {"'stretch.edge', {'type': 'bend.hinge', 'stiffness': 'report'}",
-                                        BENT};
-    for (size_t k = 0; k < sizeof terms / sizeof *terms; k++)
-        for (size_t i = 0; i < method_count; i++)
-            compare_cells(methods[i], terms[k], -9, 1e-7);
-}
-END_TEST
-
 #define TILE 4 /* cells of a tile across */
 #define ROWS 5
 
@@ -246,28 +235,6 @@ START_TEST(cells_touch_a_plane_alike)
     for (size_t i = 0; i < method_count; i++)
         if (strcmp(methods[i], "midpoint") != 0)
             compare_cells(methods[i], MEMBRANE, -0.02, 1e-5);
-}
-END_TEST
-
-/* An infinite sheet that hangs from a line: all columns have the same height and depth at any time. */
-START_TEST(an_endless_sheet_hangs_alike_everywhere)
-{
-    scene s =
-        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 6, 'diagonals': "
-                   "'parallel', 'width': "
-                   "0.2, 'height': 0.25, 'orientation': 'horizontal'},"
-                   "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2},"
-                   "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}], 'periodic': [{'from': {'edge': "
-                   "'left'}, 'to': {'edge': 'right'}}]}],"
-                   "'integrator': {'dt': 0.005, 'tolerance': 1e-13}, 'duration': 1}");
-    scene_advance(&s, 0.2);
-    const double *x = scene_state(&s)->x;
-    ck_assert_double_gt(-x[3 * 29 + 1], 0.05);
-    for (int i = 0; i < 30; i++)
-        for (int k = 0; k < 3; k++)
-            ck_assert_double_eq_tol(x[3 * i + k] - x[3 * (i - i % 5) + k], k == 0 ? 0.05 * (i % 5) : 0,
-                                    1e-12);
-    scene_close(&s);
 }
 END_TEST
 
@@ -540,9 +507,8 @@ START_TEST(what_does_not_repeat_is_refused)
 }
 END_TEST
 
-SUITE("periodic", one_cell_moves_as_each_of_three,
-      one_cell_bends_as_each_of_three, a_seam_bends_as_the_rest, a_closed_tube_is_bent_evenly,
-      cells_touch_a_plane_alike, an_endless_sheet_hangs_alike_everywhere, loads_are_alike_everywhere,
-      pressure_closes_in_a_tube, sheets_repeat_in_two_directions, the_jacobian_is_that_of_the_shared_forces,
+SUITE("periodic", one_cell_moves_as_each_of_three, a_seam_bends_as_the_rest, a_closed_tube_is_bent_evenly,
+      cells_touch_a_plane_alike, loads_are_alike_everywhere, pressure_closes_in_a_tube,
+      sheets_repeat_in_two_directions, the_jacobian_is_that_of_the_shared_forces,
       derivatives_across_edges_are_exact, periodic_edges_do_no_work, checkpoints_keep_the_period,
       hosts_keep_the_period, what_does_not_repeat_is_refused)

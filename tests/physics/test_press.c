@@ -5,11 +5,11 @@
  * pieces that met.
  */
 #include <stdio.h>
-#include <unistd.h>
 
 #include "geometry/intersect.h"
 #include "sim/inside.h"
 #include "support/crossings.h"
+#include "support/folder.h"
 #include "support/sample.h"
 #include "support/scene.h"
 
@@ -237,27 +237,20 @@ static const struct {
     /* until there is no room left: the runs stop */
     {"between two bodies", NULL,
      "'cloth': [{" SQUARE("0") ", " STIFF "}], 'colliders': [{'type': 'box', 'center': [0.02, 0.06, 0], "
-                                          "'size': 0.08, 'rotate': [1, 2, 0, 30], "
+                               "'size': 0.08, 'rotate': [1, 2, 0, 30], "
                                "'track': [[0, [0, 0, 0]], [0.15, [0, -0.03, 0]]]}, {'type': 'sphere', "
                                "'center': [0, -0.1, 0.01], "
                                "'radius': 0.08, 'track': [[0, [0, 0, 0]], [0.15, [0, 0.03, 0]]]}]"}};
 
 START_TEST(nothing_passes_through_anything)
 {
-    char folder[] = "/tmp/drape-press-XXXXXX";
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    ck_assert_int_eq(chdir(folder), 0);
+    folder_enter();
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
-        if (scenes[i].solid) {
-            FILE *file = fopen("solid.obj", "w");
-            ck_assert_ptr_nonnull(file);
-            fputs(scenes[i].solid, file);
-            fclose(file);
-        }
+        if (scenes[i].solid)
+            folder_write("solid.obj", scenes[i].solid);
         run_all(i, scenes[i].name, scenes[i].text, 1.0 / 60);
     }
-    unlink("solid.obj");
-    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
+    folder_leave();
 }
 END_TEST
 

@@ -1,6 +1,7 @@
 /*
- * test_relaxation.c: relax.maxwell: relaxation at constant strain under every method of fixed steps, what it
- * dissipates, the relaxed limit, damped vibration, and that checkpoints and new models carry the branches.
+ * test_relaxation.c: relax.maxwell: the coefficients of its steps, the relaxed limit, what it dissipates, and
+ * that checkpoints and new models carry the branches. Relaxation and creep under fixed steps are references of
+ * `drape validate`: stress_relaxation, creep.
  */
 #include "model/relaxation.h"
 #include "support/resume.h"
@@ -166,25 +167,6 @@ START_TEST(a_new_model_is_refused_as_a_first_one)
 }
 END_TEST
 
-/* Threads add in a fixed order: the same bits. */
-START_TEST(threads_change_no_bit)
-{
-    uint64_t hash[2];
-    for (int32_t k = 0; k < 2; k++) {
-        scene s = falling("{'method': 'be', 'dt': 0.01}");
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
-        def.threads = 1 + k;
-        drape_sim_destroy(&s.sim);
-        scene_start(&s, &def);
-        scene_advance(&s, 0.1);
-        hash[k] = drape_state_hash(s.model, drape_sim_state(s.sim));
-        scene_close(&s);
-    }
-    ck_assert(hash[0] == hash[1]);
-}
-END_TEST
-
 /* Every derivative, at a random state a part of a time after the last one. */
 START_TEST(derivatives_agree_with_differences)
 {
@@ -273,7 +255,7 @@ START_TEST(equilibria_need_a_lasting_part)
 }
 END_TEST
 
-SUITE("relaxation", coefficients_of_a_step, equilibria_are_relaxed,
-      losses_are_in_the_balance, checkpoints_keep_branches, a_new_model_keeps_branches,
-      a_new_model_is_refused_as_a_first_one, threads_change_no_bit, derivatives_agree_with_differences,
-      wrong_series_are_refused, integrators_with_steps_of_their_own_refuse_it, equilibria_need_a_lasting_part)
+SUITE("relaxation", coefficients_of_a_step, equilibria_are_relaxed, losses_are_in_the_balance,
+      checkpoints_keep_branches, a_new_model_keeps_branches, a_new_model_is_refused_as_a_first_one,
+      derivatives_agree_with_differences, wrong_series_are_refused,
+      integrators_with_steps_of_their_own_refuse_it, equilibria_need_a_lasting_part)

@@ -1,5 +1,5 @@
-/* test_seams.c: seams: what they carry, how they close under every integrator, their derivatives, and what
- * depends on neither threads nor checkpoints; terms of a host between two cloths. */
+/* test_seams.c: seams: what they carry, how they close under every integrator, their derivatives, and terms
+ * of a host between two cloths. */
 #include "support/methods.h"
 #include "support/scene.h"
 
@@ -145,21 +145,6 @@ START_TEST(stability_counts_slack_threads)
 }
 END_TEST
 
-/* Explicit steps, with threads 20 times as stiff as the sheet. */
-START_TEST(closes_explicitly)
-{
-    scene s = open_panels(0.05, 0.0, ", 'closing': 0.5, 'stiffness': 2000",
-                          "'method': 'verlet', 'dt': 1e-3, 'substeps': 0");
-    drape_seam_report seam;
-    scene_advance(&s, 1);
-    drape_sim_seam(s.sim, 0, &seam);
-    assert_below(seam.gap_max, 1e-3);
-    const drape_energy end = drape_sim_energy(s.sim);
-    assert_below(fabs(end.numerical), 0.02 * WEIGHT * 0.05);
-    scene_close(&s);
-}
-END_TEST
-
 /* Pieces that have nodes of a seam are neighbours: contact does not push it open, thin as the gap is in
  * comparison with the distance of layers. */
 START_TEST(is_not_in_contact)
@@ -301,71 +286,6 @@ START_TEST(dashpots_act_between_nodes)
 }
 END_TEST
 
-/* ---- Order, the same cloth ---- */
-
-/* Sides in reverse, of a list and of a box that is sorted along its longest side; and a cloth with itself. */
-START_TEST(orders_of_sides)
-{
-    scene s = scene_model(
-        "{'drape': 1, 'cloth': [{'name': 'c', 'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, 'width': "
-        "0.3, "
-        "'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "
-        "['stretch.cst']}], 'duration': 1, 'seams': ["
-        "{'type': 'stitch', 'a': {'cloth': 'c', 'nodes': [3, 1]}, 'b': {'cloth': 'c', 'nodes': [8, 9], "
-        "'reverse': "
-        "true}}, {'type': 'stitch', 'name': 'tube', 'a': {'cloth': 'c', 'box': [[0, -1, -1], [0, 1, 1]]}, "
-        "'b': "
-        "{'cloth': 'c', 'edge': 'right', 'reverse': true}}]}");
-    const int32_t first[] = {3, 9, 1, 8}, tube[] = {0, 3, 4, 7, 8, 11};
-    ck_assert_int_eq(s.model->seam_count, 2);
-    ck_assert_mem_eq(s.model->seams[0].pair, first, sizeof first);
-    ck_assert_str_eq(s.model->seams[1].name, "tube");
-    /* z falls from row to row, so a box along z begins with the last row */
-    for (int i = 0; i < 3; i++) {
-        ck_assert_int_eq(s.model->seams[1].pair[2 * i], tube[2 * (2 - i)]);
-        ck_assert_int_eq(s.model->seams[1].pair[2 * i + 1], tube[2 * (2 - i) + 1]);
-    }
-    /* 0-3, 3-9; 4-7; 8-11, 1-8 */
-    const int32_t sewn[] = {0, 1, 2, 0, 4, 5, 6, 4, 1, 0, 10, 1};
-    ck_assert_mem_eq(s.model->sewn, sewn, sizeof sewn);
-    scene_close(&s);
-}
-END_TEST
-
-/* ---- Bits ---- */
-
-static scene open_with_threads(int threads)
-{
-    scene s = scene_model(PANELS, 0.5, 0.0, 0.25, 0.03, ", 'closing': 0.5", "'dt': 0.01");
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
-    def.threads = threads;
-    scene_start(&s, &def);
-    return s;
-}
-
-/* Threads do not change the bits, nor does a checkpoint while the seam closes. */
-START_TEST(same_bits)
-{
-    scene one = open_with_threads(1), three = open_with_threads(3), later = open_with_threads(1);
-    scene_advance(&one, 0.2);
-    const bytes saved = bytes_save(one.sim);
-    scene_advance(&one, 0.7);
-    scene_advance(&three, 0.2);
-    scene_advance(&three, 0.7);
-    ck_assert_int_eq(drape_sim_restore_from(later.sim, saved.data, saved.size), DRAPE_OK);
-    scene_advance(&later, 0.7);
-    ck_assert_uint_eq(drape_sim_hash(one.sim), drape_sim_hash(three.sim));
-    ck_assert_uint_eq(drape_sim_hash(one.sim), drape_sim_hash(later.sim));
-    const drape_energy a = drape_sim_energy(one.sim), b = drape_sim_energy(later.sim);
-    ck_assert_double_eq(a.numerical, b.numerical);
-    free(saved.data);
-    scene_close(&one);
-    scene_close(&three);
-    scene_close(&later);
-}
-END_TEST
-
 /* ---- A term of a host ---- */
 
 /* E = 1/2 k |x0 - (x1 + x2)/2|^2: each node of side a is drawn to the middle of a node of side b and the next
@@ -484,58 +404,6 @@ START_TEST(term_of_a_host)
 }
 END_TEST
 
-/* A ball around the origin, whose radius is what user points to. */
-static drape_status ball_shape(const double *values, double tolerance, drape_collider_shape *shape)
-{
-    (void)values, (void)tolerance;
-    return *(double *)shape->user > 0 ? DRAPE_OK : drape_shape_refuse(shape, "", "no radius");
-}
-
-static double ball_distance(const double *values, const drape_collider_shape *shape, const double *x,
-                            double *normal, double *curvature)
-{
-    const double r = vec3_norm(x);
-    (void)values;
-    for (int i = 0; normal && i < 3; i++)
-        normal[i] = x[i] / r;
-    for (int i = 0; curvature && i < 9; i++)
-        curvature[i] = ((i % 4 == 0) - x[i / 3] * x[i % 3] / (r * r)) / r;
-    return r - *(double *)shape->user;
-}
-
-/* Colliders of a host have their user pointer, too: four nodes are 0.1 sqrt 2 m from the centre. */
-START_TEST(collider_of_a_host)
-{
-    static double radius = 0.15;
-    static const drape_collider_ops ball = {
-        .struct_size = sizeof ball,
-        .entry = {.name = "host.ball", .summary = "a ball", .reference = "d = |x| - r"},
-        .shape = ball_shape,
-        .distance = ball_distance,
-        .smooth = true,
-        .user = &radius};
-    double deepest = 0;
-    scene s = scene_empty();
-    drape_scene *parsed = NULL;
-    ck_assert_int_eq(drape_context_add_collider(s.ctx, &ball), DRAPE_OK);
-    ck_assert_int_eq(
-        drape_scene_parse(s.ctx,
-                          "{\"drape\": 1, \"duration\": 1, \"colliders\": [{\"type\": \"host.ball\"}], "
-                          "\"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 2, \"rows\": 2, "
-                          "\"width\": 0.2, \"height\": 0.2, \"transform\": {\"translate\": [-0.1, 0, 0.1]}}, "
-                          "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200}, "
-                          "\"terms\": [\"stretch.cst\"], \"pins\": [{\"row\": 0}]}]}",
-                          "ball", &parsed),
-        DRAPE_OK);
-    ck_assert_msg(drape_scene_compile(parsed, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
-    drape_scene_destroy(&parsed);
-    scene_start(&s, NULL);
-    ck_assert_int_eq(drape_sim_inside(s.sim, 0, &deepest), 2);
-    assert_below(fabs(deepest - 0.15), 1e-12); /* the centre is the middle of the diagonal, a sample */
-    scene_close(&s);
-}
-END_TEST
-
 /* What is wrong is refused where it is. */
 START_TEST(refusals)
 {
@@ -553,5 +421,5 @@ START_TEST(refusals)
 END_TEST
 
 SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, stability_counts_slack_threads,
-      closes_explicitly, is_not_in_contact, derivatives, dashpots_damp_threads, dashpots_act_between_nodes,
-      orders_of_sides, same_bits, term_of_a_host, collider_of_a_host, refusals)
+      is_not_in_contact, derivatives, dashpots_damp_threads, dashpots_act_between_nodes, term_of_a_host,
+      refusals)

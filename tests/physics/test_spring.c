@@ -36,32 +36,6 @@ static double stretch(scene *s)
     return -scene_state(s)->x[3 * 2 + 1] - LENGTH;
 }
 
-/* x = v0/wd exp(-a t) sin(wd t), a = c/(2 m), wd = sqrt(k/m - a^2): frequency and decay at once. Steps do
- * not expand the energy norm, so their errors add up. Those of IDA are at most sqrt(N) tolerances in one
- * component, N = 12 the number of unknowns, of x or, over w, of v. */
-START_TEST(one_spring_follows_the_damped_oscillator)
-{
-    static const double ratios[] = {0, 0.05, 0.6}; /* of critical damping */
-    const double w = sqrt(STIFFNESS / NODE_MASS), atol = 1e-9;
-    for (size_t k = 0; k < sizeof ratios / sizeof *ratios; k++) {
-        const double a = ratios[k] * w, wd = sqrt(w * w - a * a);
-        char integrator[128];
-        snprintf(integrator, sizeof integrator, "'method': 'ida', 'rtol': 1e-8, 'atol_x': %g, 'atol_v': %g",
-                 atol, atol * w);
-        scene s = oscillator(2 * a * NODE_MASS, integrator);
-        scene_watch(&s);
-        double diagnostic = 0;
-        for (int n = 1; n <= 40; n++) {
-            const double t = 0.05 * n;
-            scene_advance(&s, t);
-            diagnostic = fmax(diagnostic, fabs(stretch(&s) - SPEED / wd * exp(-a * t) * sin(wd * t)));
-        }
-        assert_below(diagnostic, (double)s.accepted * sqrt(12) * 2 * atol);
-        scene_close(&s);
-    }
-}
-END_TEST
-
 /* Backward Euler, whose rate is a difference of lengths: v1 = (v0 - h w^2 x0)/(1 + h^2 w^2 + h c/m), x1 = x0
  * + h v1 exactly; and the dashpot takes c ((x1 - x0)/h)^2 h a step. A residual r moves x1 by r h^2/m at
  * most, and no step expands. */
@@ -140,45 +114,6 @@ START_TEST(chain_hangs_with_its_gradient)
 END_TEST
 
 /* ---- Newton's third law ---- */
-
-/* Forces and moments of all springs and dashpots of a sheet sum to zero, with the gradient, at a deformed,
- * moving state. If a spring had the stiffness of the neighbour's row, as in Boson, 0.4 % of the force of
- * every downward spring would remain. A sum of n terms of size F is known to n DBL_EPSILON F. */
-START_TEST(forces_and_moments_sum_to_zero)
-{
-    scene s =
-        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 8, 'width': 1,"
-                   "'height': 1.3}, 'material': {'young_modulus': 1, 'thickness': 1e-3, 'total_mass': 1},"
-                   "'terms': [{'type': 'spring.structural', 'stiffness': 80, 'gradient': 0.4, 'damping': 2},"
-                   "{'type': 'spring.shear', 'stiffness': 56, 'gradient': 0.4, 'damping': 1},"
-                   "{'type': 'spring.bend', 'stiffness': 40, 'gradient': 0.4, 'damping': 0.5},"
-                   "{'type': 'limit.strain', 'over': 'springs', 'stiffness': 50}]}],"
-                   "'gravity': [0, 0, 0], 'duration': 1}");
-    const int32_t nodes = s.model->node_count;
-    double g[3 * 56], net[6] = {0}, force = 0, reach = 0;
-    drape_state *state = scene_state(&s);
-    ck_assert_int_eq(nodes, 56);
-    for (int i = 0; i < 3 * nodes; i++) {
-        state->x[i] = 1.02 * state->x[i] + 0.03 * sin(1.7 * i * i);
-        state->v[i] = cos(2.3 * i);
-    }
-    drape_system_force(s.sim->system, &(drape_point){.x = state->x, .v = state->v}, g);
-    for (int i = 0; i < nodes; i++)
-        for (int k = 0; k < 3; k++) {
-            const int a = 3 * i + (k + 1) % 3, b = 3 * i + (k + 2) % 3;
-            net[k] += g[3 * i + k];
-            net[3 + k] += state->x[a] * g[b] - state->x[b] * g[a];
-            force = fmax(force, fabs(g[3 * i + k]));
-            reach = fmax(reach, fabs(state->x[3 * i + k]));
-        }
-    ck_assert_double_gt(force, 1);
-    for (int k = 0; k < 3; k++) {
-        assert_below(fabs(net[k]), 8 * 3 * nodes * DBL_EPSILON * force);
-        assert_below(fabs(net[3 + k]), 8 * 6 * nodes * DBL_EPSILON * force * reach);
-    }
-    scene_close(&s);
-}
-END_TEST
 
 /* r rows and c columns: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c
  * bend springs, each with its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
@@ -373,7 +308,7 @@ START_TEST(collapsed_spring_is_named)
 }
 END_TEST
 
-SUITE("spring", one_spring_follows_the_damped_oscillator, backward_euler_takes_the_dashpot_in_step_form,
-      midpoint_accounts_for_every_joule, chain_hangs_with_its_gradient, forces_and_moments_sum_to_zero,
-      springs_join_the_right_nodes, limit_balances_its_load, limit_is_smooth_twice,
-      limit_holds_a_hundredfold_load, overload_stops_with_the_reason, collapsed_spring_is_named)
+SUITE("spring", backward_euler_takes_the_dashpot_in_step_form, midpoint_accounts_for_every_joule,
+      chain_hangs_with_its_gradient, springs_join_the_right_nodes, limit_balances_its_load,
+      limit_is_smooth_twice, limit_holds_a_hundredfold_load, overload_stops_with_the_reason,
+      collapsed_spring_is_named)

@@ -29,11 +29,17 @@ static inline void frames_folder_remove(const frames_folder *f)
     ck_assert_int_eq(system(command), 0);
 }
 
+/* The path of a file in the folder, until the next call. */
+static inline const char *frames_path(const frames_folder *f, const char *name)
+{
+    static char path[200];
+    snprintf(path, sizeof path, "%s/%s", f->path, name);
+    return path;
+}
+
 static inline FILE *frames_file(const frames_folder *f, const char *name)
 {
-    char path[200];
-    snprintf(path, sizeof path, "%s/%s", f->path, name);
-    FILE *file = fopen(path, "wb");
+    FILE *file = fopen(frames_path(f, name), "wb");
     ck_assert_ptr_nonnull(file);
     return file;
 }

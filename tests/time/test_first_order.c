@@ -1,7 +1,6 @@
 /*
  * test_first_order.c: the integrators that choose their own steps by a local error: they agree when their
- * tolerances are tight, have the orders that they are set to, end at the ends of their runs, and continue
- * as they were after a checkpoint; the energy of an oscillator under dirk in closed form.
+ * tolerances are tight, have the orders that they are set to, and end at the ends of their runs.
  *
  * The sheet is that of test_order.c: E h = 20 N/m, 2 g a node, dashpots and drag: smooth, with waves that
  * steps of a millisecond resolve.
@@ -145,74 +144,11 @@ END_TEST
 
 /* ---- An oscillator ---- */
 
-#define LENGTH  0.1
-#define MODULUS 1e6
-
-/* The centre of a hexagon of pinned springs, as in test_oscillator.c: linear up to the square of the
- * strain. */
-static scene oscillator(double max_step, double speed)
-{
-    return scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': %g,"
-                      "'transform': {'translate': [%.17g, 0, %.17g]}},"
-                      "'material': {'young_modulus': %g, 'thickness': 1e-3, 'areal_density': 0.2},"
-                      "'terms': ['stretch.edge'], 'velocity': [%.17g, 0, 0],"
-                      "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}],"
-                      "'gravity': [0, 0, 0], 'integrator': {'method': 'dirk', 'order': 2, 'atol_x': 1e6,"
-                      "'atol_v': 1e6, 'max_step': %.17g}, 'duration': 1}",
-                      LENGTH, -1.5 * LENGTH, 0.8660254037844386 * LENGTH, MODULUS, speed, max_step);
-}
-
-/* |R(i w h)|^2 of TR-BDF2: the trapezoidal rule to g h, g = 2 - sqrt(2), then BDF2. */
-static double factor_of(double phase)
-{
-    const double g = 2 - sqrt(2.0);
-    const double complex z = I * phase, middle = (1 + g / 2 * z) / (1 - g / 2 * z);
-    const double complex end = (middle - (1 - g) * (1 - g)) / (g * (2 - g)) / (1 - (1 - g) / (2 - g) * z);
-    return creal(end * conj(end));
-}
-
 /* Compares the energies of successive steps of one size. */
 typedef struct decay {
     double h, factor, before, worst;
     int count;
 } decay;
 
-static drape_status watch_decay(void *user, const drape_event *event)
-{
-    decay *d = user;
-    if (event->kind != DRAPE_EVENT_ATTEMPT || !event->attempt->accepted)
-        return DRAPE_OK;
-    const drape_energy e = drape_sim_energy(event->sim);
-    const double now = e.kinetic + e.elastic;
-    if (d->count > 1 && fabs(event->attempt->h / d->h - 1) < 1e-9)
-        d->worst = fmax(d->worst, fabs(now / d->before / d->factor - 1));
-    d->count = fabs(event->attempt->h / d->h - 1) < 1e-9 ? d->count + 1 : 0;
-    d->before = now;
-    return DRAPE_OK;
-}
-
-/* The tolerance is no bound on the step. Steps grow fivefold up to max_step; after two of that size factors
- * are those of it. The equations are linear, so one correction solves them up to the square of the strain,
- * 1e-10, and the rounding of strains, DBL_EPSILON over 1e-5 times the decay so far, 1e-3 at most. */
-START_TEST(energy_factor_of_tr_bdf2)
-{
-    static const double phases[] = {0.3, 1, 3};
-    for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
-        const double spring = 3 * 0.8660254037844386 * MODULUS * 1e-3,
-                     mass = 0.2 * 0.8660254037844386 * LENGTH * LENGTH, w = sqrt(spring / mass);
-        decay d = {.h = phases[k] / w, .factor = factor_of(phases[k])};
-        scene s = oscillator(d.h, 1e-5 * LENGTH * w);
-        ck_assert_int_eq(drape_sim_observe(s.sim, watch_decay, &d), DRAPE_OK);
-        scene_advance(&s, 12 * d.h);
-        printf("# w h = %g: the energy falls by %.6f in a step, within %.2g, %d steps\n", phases[k], d.factor,
-               d.worst, d.count);
-        ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 10);
-        ck_assert_double_gt(d.worst, 0);
-        assert_below(d.worst, 1e-6);
-        scene_close(&s);
-    }
-}
-END_TEST
-
 SUITE("first_order", they_agree_at_tight_tolerances, dirk_has_the_order_that_is_set, runs_end_at_their_ends,
-      the_energy_balance_is_kept, energy_factor_of_tr_bdf2)
+      the_energy_balance_is_kept)

@@ -203,55 +203,12 @@ START_TEST(kinks_at_ends_of_steps_leave_the_order)
 }
 END_TEST
 
-/* Without dashpots the acceleration does not jump, but its slope does: a single error of h^2 in v, for bdf2
- * as for all. */
-START_TEST(kinks_without_dashpots_leave_the_order_too)
-{
-    for (int i = 0; drape_integrators[i]; i++)
-        if (has_fixed_steps(drape_integrators[i]))
-            check_slope(drape_integrators[i]->entry.name, "", MOVED, equal_steps,
-                        drape_integrators[i]->order);
-}
-END_TEST
-
-static double steps_across_kinks(int k, int n)
-{
-    return k == 0 ? 0 : k == n ? END : END * (k - 0.5) / (n - 1);
-}
-
-/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots'
- * rates are differences of q, the impulse of a dashpot over the step is right and the order is kept.
- * midpoint takes the rate at the middle of the step, grad q . v: its impulse is off by h times a jump:
- * order 1, which shows only where that is larger than its error of second order. */
-START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first)
-{
-    check_slope("be", DASHPOTS, MOVED, steps_across_kinks, 1);
-    check_slope("bdf2", DASHPOTS, MOVED, steps_across_kinks, 2);
-    const double slope = slope_of("midpoint", DASHPOTS, MOVED, steps_across_kinks);
-    ck_assert_msg(slope > 1 - BOUND && slope < 2 - BOUND, "midpoint: slope %g", slope);
-}
-END_TEST
-
 /* ---- The error controller ---- */
 
 typedef struct step_log {
     double t[40000], h[40000];
     int count, rejected;
 } step_log;
-
-static drape_status note_step(void *user, const drape_event *event)
-{
-    step_log *log = user;
-    if (event->kind != DRAPE_EVENT_ATTEMPT)
-        return DRAPE_OK;
-    log->rejected += !event->attempt->accepted;
-    if (!event->attempt->accepted)
-        return DRAPE_OK;
-    ck_assert_int_lt(log->count, 40000);
-    log->t[log->count] = event->attempt->t;
-    log->h[log->count++] = event->attempt->h;
-    return DRAPE_OK;
-}
 
 static drape_sim_def controlled(const char *method, const drape_setting *settings, size_t count)
 {
@@ -296,35 +253,6 @@ START_TEST(error_falls_with_the_controllers_rtol)
             assert_below(before, first * pow(10, -0.75 * (5 - from) * method->order / (method->order + 1)));
     }
     free(reference);
-}
-END_TEST
-
-/* The PI rule changes sizes smoothly: they are at most doubled (bdf2 is stable below 1 + sqrt(2)), and few
- * steps are rejected: less than a tenth where the motion is smooth. The last steps of the advance are cut
- * to end with it. */
-START_TEST(steps_of_the_error_controller_change_gently)
-{
-    static step_log log;
-    for (int i = 0; drape_integrators[i]; i++) {
-        const drape_setting rtol = {"rtol", 1e-4, NULL};
-        double largest = 0, smallest = INFINITY;
-        if (!has_fixed_steps(drape_integrators[i]))
-            continue;
-        const drape_sim_def def = controlled(drape_integrators[i]->entry.name, &rtol, 1);
-        scene s = sheet(DASHPOTS, HUNG, &def);
-        log = (step_log){.count = 0};
-        ck_assert_int_eq(drape_sim_observe(s.sim, note_step, &log), DRAPE_OK);
-        scene_advance(&s, END);
-        for (int k = 1; k < log.count - 2; k++) {
-            largest = fmax(largest, log.h[k] / log.h[k - 1]);
-            smallest = fmin(smallest, log.h[k] / log.h[k - 1]);
-        }
-        printf("# %s: %d steps, %d rejected, ratios %.3f to %.3f\n", drape_integrators[i]->entry.name,
-               log.count, log.rejected, smallest, largest);
-        ck_assert_double_le(largest, 2 * (1 + 1e-9)); /* times are rounded */
-        ck_assert_int_le(10 * log.rejected, log.count);
-        scene_close(&s);
-    }
 }
 END_TEST
 
@@ -413,7 +341,4 @@ END_TEST
 
 SUITE("order", every_integrator_converges_with_the_order_it_declares, dirk_converges_with_each_of_its_orders,
       steps_of_changing_size_keep_the_order, kinks_at_ends_of_steps_leave_the_order,
-      kinks_without_dashpots_leave_the_order_too,
-      kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
-      error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
-      the_estimate_for_backward_euler_is_its_local_error)
+      error_falls_with_the_controllers_rtol, the_estimate_for_backward_euler_is_its_local_error)

@@ -332,79 +332,7 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
 }
 END_TEST
 
-/* Updates within a step keep the factors on the coarse space, which precondition alone: in a sheet that was
- * stretched by a tenth and turned by a right angle since, solutions are those of the new matrix. */
-START_TEST(coarse_factors_are_those_of_the_step)
-{
-    state q = open_state(15, "'stretch.edge', 'bend.hinge'");
-    double *b = calloc(q.n, sizeof *b), left = 0, all = 0;
-    uint64_t seed = 8;
-    for (size_t i = 0; i < q.n; i++)
-        b[i] = random_number(&seed);
-    drape_approx_jacobian_ops.begin(q.jacobian, false, 500);
-    update(&drape_approx_jacobian_ops, q.jacobian, &q.point, &q.work);
-    for (int32_t i = 0; i < q.s.model->node_count; i++) {
-        double *x = q.at.x + 3 * i;
-        memcpy(x, (double[3]){-1.1 * x[1], 1.1 * x[0], 1.1 * x[2]}, 3 * sizeof *x);
-    }
-    update(&drape_approx_jacobian_ops, q.jacobian, &q.point, &q.work);
-    ck_assert_int_eq(q.work.factorizations, 1);
-    solve(&drape_approx_jacobian_ops, q.jacobian, b, 1e-6, q.x, &q.work);
-    drape_approx_jacobian_multiply(q.jacobian, q.x, q.y);
-    for (size_t i = 0; i < q.n; i++) {
-        left += (b[i] - q.y[i]) * (b[i] - q.y[i]);
-        all += b[i] * b[i];
-    }
-    ck_assert_double_lt(left, 1e-6 * all); /* as above */
-    drape_approx_jacobian_ops.begin(q.jacobian, false, 500);
-    update(&drape_approx_jacobian_ops, q.jacobian, &q.point, &q.work);
-    ck_assert_int_eq(q.work.factorizations, 2);
-    free(b);
-    close_state(&q);
-}
-END_TEST
-
 /* ---- The factored matrix ---- */
-
-/* Scalars stand for bending of a flat sheet. The gradients of stretching in a triangle lie in its plane, in
- * two directions, and pairs have their own blocks. */
-START_TEST(scalars_stand_for_flat_bending_only)
-{
-    state q = open_state(7, "'stretch.edge', 'stretch.cst', 'bend.hinge', 'bend.midedge'");
-    bool covers[8];
-    ck_assert_int_le(q.s.model->term_count, 8);
-    ck_assert_int_eq(drape_scalar_stiffness_covers(q.system, covers), DRAPE_OK);
-    for (int32_t t = 0; t < q.s.model->term_count; t++) {
-        const char *name = q.s.model->terms[t].ops->entry.name;
-        ck_assert_msg(covers[t] == (strncmp(name, "bend.", 5) == 0), "%s", name);
-    }
-    close_state(&q);
-}
-END_TEST
-
-/* Stretching in triangles needs it, stretching along edges if waves cross the sheet, of 1.4 m along the
- * diagonal here: sqrt(E h/0.2 kg/m2) = 71 m/s, times a number near one that depends on the lattice, is 0.8
- * lengths in 1/60 s and eight in 1/6 s. */
-START_TEST(stiff_membranes_need_factors)
-{
-    static const struct {
-        const char *terms;
-        double dt;
-        bool better, needed;
-    } cases[] = {{"'stretch.edge', 'bend.hinge'", 1. / 60, false},
-                 {"'stretch.edge', 'bend.hinge'", 1. / 6, true},
-                 {"'stretch.edge', 'bend.midedge'", 1. / 60, false},
-                 {"'stretch.cst', 'bend.hinge'", 1. / 600, true}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        state q = open_state(16, cases[i].terms); /* not few nodes */
-        bool better, needed;
-        ck_assert_int_eq(drape_factored_jacobian_is_better(q.system, cases[i].dt, &better, &needed),
-                         DRAPE_OK);
-        ck_assert_msg(better == cases[i].better, "%s at %g s", cases[i].terms, cases[i].dt);
-        close_state(&q);
-    }
-}
-END_TEST
 
 /* Without bending it is m_w M + J+ itself at any state, and A (A^-1 b) = b up to the condition of a stiff
  * sheet, 1e5, times rounding. */
@@ -525,26 +453,9 @@ START_TEST(factored_matrix_is_corrected_for_drag)
 }
 END_TEST
 
-/* Drag of single nodes couples nothing, and is symmetric; that of the wind does, and is not. */
-START_TEST(drag_of_nodes_needs_no_factors)
-{
-    static const char *const terms[] = {"{'type': 'drag.viscous', 'coefficient': 0.1}",
-                                        "{'type': 'drag.wind', 'wind': [5, 0, 2]}"};
-    for (int wind = 0; wind < 2; wind++) {
-        state q = open_state(20, terms[wind]);
-        bool better, needed;
-        ck_assert_int_eq(drape_factored_jacobian_is_better(q.system, 1. / 60, &better, &needed), DRAPE_OK);
-        ck_assert_int_eq(needed, wind);
-        ck_assert_int_eq(drape_system_has_symmetric_terms(q.system), !wind);
-        close_state(&q);
-    }
-}
-END_TEST
-
 SUITE("approx_jacobian", coarse_functions_are_a_partition_of_unity, restriction_is_the_transpose,
       nodes_without_neighbours_are_alone, conjugate_gradients_end_with_the_eigenvalues,
       negative_curvature_is_reported, without_bending_it_is_the_positive_jacobian,
       across_a_flat_sheet_bending_is_exact, it_is_solved_in_few_iterations_at_any_size,
-      coarse_factors_are_those_of_the_step, scalars_stand_for_flat_bending_only, stiff_membranes_need_factors,
       factored_matrix_is_the_positive_jacobian, lumped_factors_solve_with_all_of_bending,
-      factored_matrix_is_corrected_for_drag, drag_of_nodes_needs_no_factors)
+      factored_matrix_is_corrected_for_drag)

@@ -6,6 +6,7 @@
 
 #include "base/rotation.h"
 #include "io/recorder.h"
+#include "support/folder.h"
 #include "support/frames.h"
 #include "support/scene.h"
 
@@ -73,19 +74,6 @@ static bool exists(const frames_folder *f, const char *name)
     char path[200];
     snprintf(path, sizeof path, "%s/out/%s", f->path, name);
     return access(path, F_OK) == 0;
-}
-
-static char *slurp(const frames_folder *f, const char *name, size_t *size)
-{
-    char path[200];
-    snprintf(path, sizeof path, "%s/out/%s", f->path, name);
-    FILE *file = fopen(path, "rb");
-    ck_assert_msg(file != NULL, "%s is not there", path);
-    char *data = malloc(1 << 22);
-    *size = fread(data, 1, (1 << 22) - 1, file);
-    data[*size] = 0;
-    fclose(file);
-    return data;
 }
 
 static uint32_t word_at(const char *data, size_t at)
@@ -158,7 +146,7 @@ START_TEST(glb_has_colliders_that_move)
     frames_folder f = frames_folder_make();
     scene s = bodies_scene(&f, "z"); /* which changes nothing here */
     record(&s, &f, "glb");
-    glb g = {.data = slurp(&f, "positions.glb", &g.size)};
+    glb g = {.data = file_read(frames_path(&f, "out/positions.glb"), &g.size)};
     json_error_t error;
     g.binary = 28 + (size_t)word_at(g.data, 12);
     g.json = json_loadb(g.data + 20, word_at(g.data, 12), JSON_REJECT_DUPLICATES, &error);
@@ -253,7 +241,7 @@ static const double *vtp_points(const frames_folder *f, const char *name, size_t
 {
     size_t size;
     int points, polygons;
-    *data = slurp(f, name, &size);
+    *data = file_read(frames_path(f, name), &size);
     const char *piece = strstr(*data, "<Piece "), *appended = strstr(*data, "encoding=\"raw\">\n_");
     ck_assert(piece && appended);
     ck_assert_int_eq(sscanf(piece,
@@ -279,7 +267,7 @@ START_TEST(vtp_has_colliders_as_parts)
     scene s = bodies_scene(&f, "z");
     record(&s, &f, "vtp");
     size_t size, count;
-    char *pvd = slurp(&f, "frames.pvd", &size), *data;
+    char *pvd = file_read(frames_path(&f, "out/frames.pvd"), &size), *data;
     for (int k = 0; k < FRAMES; k++) {
         for (int b = 0; b < 4; b++) {
             char name[64], entry[200];

@@ -10,6 +10,7 @@
 #include "mesh/mesh.h"
 #include "mesh/remedy.h"
 #include "support/failing_allocator.h"
+#include "support/folder.h"
 #include "support/frames.h"
 #include "support/scene.h"
 
@@ -388,19 +389,6 @@ static void record(scene *s, const frames_folder *f, const char *format)
     drape_recorder_destroy(&recorder);
 }
 
-static char *slurp(const frames_folder *f, const char *name, size_t *size)
-{
-    char path[200];
-    snprintf(path, sizeof path, "%s/%s", f->path, name);
-    FILE *file = fopen(path, "rb");
-    ck_assert_msg(file != NULL, "%s is not there", path);
-    char *data = malloc(1 << 20);
-    *size = fread(data, 1, (1 << 20) - 1, file);
-    data[*size] = 0;
-    fclose(file);
-    return data;
-}
-
 /* Frames have the faces that the mesh had: the frame read again, the grid apart, is the mesh but for
  * positions. */
 START_TEST(obj_frames_have_the_faces_of_the_mesh)
@@ -458,7 +446,7 @@ typedef struct glb {
 
 static glb glb_load(const frames_folder *f)
 {
-    glb g = {.data = slurp(f, "out/positions.glb", &g.size)};
+    glb g = {.data = file_read(frames_path(f, "out/positions.glb"), &g.size)};
     const uint32_t text = word_at(g.data, 12);
     json_error_t error;
     g.binary = 28 + (size_t)text;

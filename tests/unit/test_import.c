@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include "mesh/mesh.h"
-#include "support/comma.h"
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
@@ -160,19 +159,6 @@ START_TEST(obj_faults)
                  "/m/file: bad.obj:5: a corner is \"%s\"; it must be v, v/vt, v//vn or v/vt/vn", wrong[i]);
         obj_refused(text, message);
     }
-}
-END_TEST
-
-START_TEST(obj_zero_bytes_and_endless_words)
-{
-    static const char zero[] = "v 0 0 0\nv 1\0 0 0\n";
-    assert_refused(&drape_import_obj, zero, sizeof zero - 1,
-                   "/m/file: bad.obj:2: x of a node is \"1\"; it must be a finite number");
-    char word[5000] = "v ";
-    memset(word + 2, 'x', sizeof word - 3);
-    obj_refused(word,
-                "/m/file: bad.obj:1: x of a node is \"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx\"; it must "
-                "be a finite number");
 }
 END_TEST
 
@@ -469,43 +455,9 @@ START_TEST(ply_binary_faults)
 }
 END_TEST
 
-/* Every prefix of a file is read, or refused with a message of one line; the sanitizers look for other
- * faults. */
-static void truncate_everywhere(const drape_import_ops *import, const void *data, size_t size)
-{
-    for (size_t length = 0; length < size; length++) {
-        drape_context *ctx = new_context();
-        drape_mesh mesh;
-        const drape_status status = read_bytes(ctx, import, data, length, &mesh);
-        ck_assert(status == DRAPE_OK || status == DRAPE_E_PARSE);
-        ck_assert(status == DRAPE_OK || strlen(drape_context_message(ctx)) > 10);
-        drape_mesh_free(&mesh);
-        drape_context_destroy(&ctx);
-    }
-}
-
 static const char rich_obj[] =
     "# sheet\nv 0 0 0\nv 1 0 0 \\\n 1\nv 1 1 0\r\nv 0 1 0\nvt 0 0\nf 1/1/1 2//2 -2 "
     "4\nf 1 2 3\n";
-
-START_TEST(truncated_at_every_byte)
-{
-    truncate_everywhere(&drape_import_obj, rich_obj, sizeof rich_obj - 1);
-    const bytes little = binary_square(false, "\n"), big = binary_square(true, "\r\n");
-    truncate_everywhere(&drape_import_ply, little.data, little.size);
-    truncate_everywhere(&drape_import_ply, big.data, big.size);
-    static const char text[] = ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3\n";
-    truncate_everywhere(&drape_import_ply, text, sizeof text - 1);
-    const bytes small = small_binary(); /* without additional elements, no prefix of it is a whole mesh */
-    for (size_t length = 0; length < small.size; length++) {
-        drape_context *ctx = new_context();
-        drape_mesh mesh;
-        ck_assert_int_eq(read_bytes(ctx, &drape_import_ply, small.data, length, &mesh), DRAPE_E_PARSE);
-        drape_mesh_free(&mesh);
-        drape_context_destroy(&ctx);
-    }
-}
-END_TEST
 
 /* Every byte is replaced by several critical ones: the file is read and validated, or refused; it never
  * crashes and never takes much memory. */
@@ -689,24 +641,6 @@ START_TEST(content_faults_name_the_file)
 }
 END_TEST
 
-START_TEST(numbers_do_not_depend_on_the_locale)
-{
-    const folder f = new_folder();
-    const char *obj = "v 0.5 0 0\nv 1.25 0 0\nv 0 1.5 0\nf 1 2 3\n";
-    comma_begin();
-    drape_context *ctx = new_context();
-    drape_mesh mesh;
-    write_file(&f, "a.obj", obj, strlen(obj));
-    ck_assert_int_eq(make_file(ctx, &f, "a.obj", &mesh), DRAPE_OK);
-    ck_assert_double_eq(mesh.x[3], 1.25);
-    drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
-    comma_end();
-    remove_file(&f, "a.obj");
-    rmdir(f.path);
-}
-END_TEST
-
 static void fail_every_allocation(const folder *f, const char *name)
 {
     drape_status status = DRAPE_E_MEMORY;
@@ -740,8 +674,7 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
 END_TEST
 
 SUITE("import", obj_corners_of_every_form, obj_lines_of_every_form, obj_numbers_of_every_form, obj_faults,
-      obj_zero_bytes_and_endless_words, ply_ascii, ply_header_faults, ply_header_limits,
-      ply_ascii_data_faults, ply_counts_beyond_the_file_take_no_memory, ply_binary,
-      ply_binary_integers_keep_their_sign, ply_binary_faults, truncated_at_every_byte, every_byte_changed,
-      files_by_ending_relative_and_absolute, file_faults, content_faults_name_the_file,
-      numbers_do_not_depend_on_the_locale, every_failed_allocation_is_reported_and_none_leaks)
+      ply_ascii, ply_header_faults, ply_header_limits, ply_ascii_data_faults,
+      ply_counts_beyond_the_file_take_no_memory, ply_binary, ply_binary_integers_keep_their_sign,
+      ply_binary_faults, every_byte_changed, files_by_ending_relative_and_absolute, file_faults,
+      content_faults_name_the_file, every_failed_allocation_is_reported_and_none_leaks)

@@ -96,20 +96,6 @@ START_TEST(crossing_sheets_are_counted_as_by_all_pairs)
 }
 END_TEST
 
-START_TEST(sheets_apart_have_none)
-{
-    drape_context *ctx = NULL;
-    drape_intersections found;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    drape_model *model = crossed_squares(ctx, 3);
-    ck_assert_int_eq(drape_find_intersections(ctx, model, model->rest, &found), DRAPE_OK);
-    ck_assert_int_eq(found.count, 0);
-    ck_assert_int_eq(found.edge[0], -1);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
-}
-END_TEST
-
 /* In a flat sheet nothing crosses, whatever its rotation: its volumes are rounding errors. */
 START_TEST(a_flat_sheet_has_none)
 {
@@ -202,5 +188,5 @@ START_TEST(sides_belong_to_triangles)
 }
 END_TEST
 
-SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none, a_flat_sheet_has_none,
-      signs_are_exact, sides_belong_to_triangles)
+SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, a_flat_sheet_has_none, signs_are_exact,
+      sides_belong_to_triangles)

@@ -1,5 +1,5 @@
 /* test_io.c: the files of the recorder and the summary are read back and compared to the last digit; no
- * failure, and not even a kill, leaves a file that cannot be read. */
+ * failure leaves a file that cannot be read. Runs that are killed are tested by cli/signals. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -20,6 +20,7 @@
 #include "io/recorder.h"
 #include "io/summary.h"
 #include "support/comma.h"
+#include "support/folder.h"
 
 /* Two cloths; frames of 1/40 s fall on and between the steps of 1/100 s. */
 #define COLUMNS     8
@@ -188,19 +189,6 @@ static void write_text(const char *path, const char *text)
     fclose(file);
 }
 
-/* The whole file, followed by a 0, to be freed. */
-static char *slurp(const char *path, size_t *size)
-{
-    FILE *file = fopen(path, "rb");
-    ck_assert_msg(file != NULL, "%s is not there", path);
-    size_t room = 1 << 20;
-    char *data = malloc(room + 1);
-    *size = fread(data, 1, room, file);
-    data[*size] = 0;
-    fclose(file);
-    return data;
-}
-
 static int count_files(const char *folder, const char *ending)
 {
     int count = 0;
@@ -222,7 +210,7 @@ static int64_t read_npy(const char *folder, char **data)
     size_t size;
     int64_t frames = -1;
     char expected[HEADER_SIZE + 1], dict[HEADER_SIZE];
-    *data = slurp(in_folder(folder, "positions.npy"), &size);
+    *data = file_read(in_folder(folder, "positions.npy"), &size);
     ck_assert_uint_ge(size, HEADER_SIZE);
     ck_assert_int_eq(memcmp(*data, "\x93NUMPY\x01\x00\x76\x00", 10), 0);
     ck_assert_int_eq(
@@ -262,39 +250,6 @@ START_TEST(npy_is_exact)
     ck_assert_int_eq(memcmp(data + HEADER_SIZE, drape_model_rest_positions(w.model), FRAME_SIZE), 0);
     ck_assert_int_ne(memcmp(w.seen.x[0], w.seen.x[1], FRAME_SIZE), 0);
     ck_assert_int_eq(count_files(w.out, ".part"), 0);
-    free(data);
-    tear_down(&w);
-}
-END_TEST
-
-static drape_status read_during_run(void *user, const drape_event *event)
-{
-    char *data;
-    if (event->kind != DRAPE_EVENT_FRAME)
-        return DRAPE_OK;
-    const world *w = user;
-    int64_t frames = read_npy(w->out, &data);
-    ck_assert_int_eq(frames, event->frame + 1);
-    ck_assert_int_eq(
-        memcmp(data + HEADER_SIZE + (size_t)event->frame * FRAME_SIZE, event->positions, FRAME_SIZE), 0);
-    free(data);
-    return DRAPE_OK;
-}
-
-START_TEST(npy_is_valid_after_each_frame)
-{
-    world w;
-    char *data;
-    drape_recorder *recorder;
-    set_up(&w);
-    ck_assert_int_eq(record(&w, w.ctx, "npy", &recorder), DRAPE_OK);
-    ck_assert_int_eq(read_npy(w.out, &data), 0);
-    free(data);
-    ck_assert_int_eq(drape_sim_observe(w.sim, read_during_run, &w), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(w.sim, 0.21), DRAPE_OK);
-    ck_assert_int_eq(drape_recorder_done(recorder).frames, 9);
-    drape_recorder_destroy(&recorder); /* without a last frame */
-    ck_assert_int_eq(read_npy(w.out, &data), 9);
     free(data);
     tear_down(&w);
 }
@@ -382,7 +337,7 @@ static void check_ply(const world *w, const char *name, const double *x)
 {
     size_t size;
     const int32_t *expected = drape_model_triangles(w->model);
-    char *data = slurp(in_folder(w->out, name), &size), header[256];
+    char *data = file_read(in_folder(w->out, name), &size), header[256];
     snprintf(header, sizeof header,
              "element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
              "element face %d\nproperty list uchar int vertex_indices\nend_header\n",
@@ -572,7 +527,7 @@ START_TEST(steps_has_a_row_for_each_attempt)
     set_up(&w);
     run(&w, NULL, 0.11);
     ck_assert_int_ge(w.seen.attempts, 11);
-    char *data = slurp(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns);
+    char *data = file_read(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns);
     ck_assert_int_eq(strncmp(data, columns, strlen(columns)), 0);
     for (int i = 0; i < w.seen.attempts; i++) {
         char *field[FIELDS + 1];
@@ -616,7 +571,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     ck_assert_int_eq(drape_file_close(&file), DRAPE_OK);
     drape_file_destroy(&file);
     drape_folder_close(&folder);
-    char *data = slurp(in_folder(w.folder, "steps.csv"), &size), *row = data + strlen(columns);
+    char *data = file_read(in_folder(w.folder, "steps.csv"), &size), *row = data + strlen(columns);
     ck_assert_ptr_nonnull(strstr(data, ",nan,inf,"));
     ck_assert_ptr_nonnull(strstr(data, ",\"ratio, \"\"worst\"\"\",\"host\nterm\",7,1 23 456,"));
     for (int i = 0; i < 3; i++) {
@@ -644,7 +599,7 @@ START_TEST(energies_are_of_the_state_at_or_after_the_frame)
     set_up(&w);
     const drape_energy start = drape_sim_energy(w.sim);
     run(&w, NULL, 0.11);
-    char *data = slurp(in_folder(w.out, "energy.csv"), &size), *row = data + strlen(energy_columns);
+    char *data = file_read(in_folder(w.out, "energy.csv"), &size), *row = data + strlen(energy_columns);
     ck_assert_int_eq(strncmp(data, energy_columns, strlen(energy_columns)), 0);
     for (int k = 0; k < 6; k++) { /* and 0.11, where the run ends */
         char *field[ENERGY_FIELDS + 1];
@@ -734,30 +689,9 @@ START_TEST(full_disk_leaves_whole_rows)
     size_t size;
     set_up(&w);
     run_on_small_disk(&w, NULL, 1000, "steps.csv");
-    char *data = slurp(in_folder(w.out, "steps.csv"), &size);
+    char *data = file_read(in_folder(w.out, "steps.csv"), &size);
     ck_assert_uint_gt(size, strlen(columns));
     ck_assert_uint_le(size, 1000);
-    ck_assert_int_eq(data[size - 1], '\n');
-    free(data);
-    tear_down(&w);
-}
-END_TEST
-
-/* Frames are so frequent that their rows fill the disk before those of the steps do. */
-START_TEST(full_disk_leaves_whole_rows_of_energies)
-{
-    world w;
-    size_t size;
-    drape_sim_def def;
-    set_up(&w);
-    drape_sim_destroy(&w.sim);
-    drape_sim_def_init(&def, sizeof def);
-    def.frame_rate = 10 / DT;
-    ck_assert_int_eq(drape_sim_create(w.ctx, w.model, &def, &w.sim), DRAPE_OK);
-    run_on_small_disk(&w, NULL, 2000, "energy.csv");
-    char *data = slurp(in_folder(w.out, "energy.csv"), &size);
-    ck_assert_uint_gt(size, strlen(energy_columns));
-    ck_assert_uint_le(size, 2000);
     ck_assert_int_eq(data[size - 1], '\n');
     free(data);
     tear_down(&w);
@@ -793,7 +727,7 @@ static uint32_t word_at(const char *data, size_t at)
 static uint32_t check_pc2(const world *w)
 {
     size_t size;
-    char *data = slurp(in_folder(w->out, "positions.pc2"), &size);
+    char *data = file_read(in_folder(w->out, "positions.pc2"), &size);
     ck_assert_uint_ge(size, 32);
     ck_assert_int_eq(memcmp(data, "POINTCACHE2\0\1\0\0", 16), 0);
     uint32_t points = word_at(data, 16), samples = word_at(data, 28);
@@ -823,7 +757,7 @@ static json_t *load_glb(const world *w)
 {
     size_t size;
     json_error_t error;
-    char *data = slurp(in_folder(w->out, "positions.glb"), &size);
+    char *data = file_read(in_folder(w->out, "positions.glb"), &size);
     ck_assert_uint_ge(size, 28);
     ck_assert_int_eq(memcmp(data, "glTF\2\0\0", 8), 0);
     ck_assert_uint_eq(word_at(data, 8), size);
@@ -927,7 +861,7 @@ START_TEST(full_disk_leaves_a_valid_collection)
         int frames = write_frames(&w, vtp, room), named = 0;
         ck_assert_msg(strstr(drape_context_message(w.ctx), "frames.pvd") != NULL, "%s",
                       drape_context_message(w.ctx));
-        char *data = slurp(in_folder(w.out, "frames.pvd"), &size);
+        char *data = file_read(in_folder(w.out, "frames.pvd"), &size);
         ck_assert_uint_le(size, room);
         ck_assert_str_eq(data + size - strlen("</Collection></VTKFile>\n"), "</Collection></VTKFile>\n");
         ck_assert_ptr_eq(strstr(data, "</Collection>"), data + size - strlen("</Collection></VTKFile>\n"));
@@ -1006,69 +940,6 @@ START_TEST(unknown_formats_are_refused_before_anything_is_made)
     refuse(&w, "npz", DRAPE_E_ARGUMENT, "did you mean \"npy\"?");
     refuse(&w, "holography", DRAPE_E_ARGUMENT, "there are npy, obj, ply");
     ck_assert(!exists(w.folder, "a"));
-    tear_down(&w);
-}
-END_TEST
-
-START_TEST(too_many_observers_are_reported)
-{
-    world w;
-    set_up(&w);
-    while (drape_sim_observe(w.sim, watch, &w.seen) == DRAPE_OK)
-        continue;
-    refuse(&w, "npy", DRAPE_E_ARGUMENT, "");
-    tear_down(&w);
-}
-END_TEST
-
-static drape_status kill_at_frame_5(void *user, const drape_event *event)
-{
-    (void)user;
-    if (event->kind == DRAPE_EVENT_FRAME && event->frame == 5)
-        raise(SIGKILL);
-    return DRAPE_OK;
-}
-
-START_TEST(a_killed_run_leaves_whole_files)
-{
-    world w;
-    char *data;
-    size_t size;
-    set_up(&w);
-    pid_t child = fork();
-    if (child == 0) {
-        drape_recorder *recorder;
-        const char *const formats[] = {"npy", "obj", "vtp", "pc2", "glb"};
-        const drape_recorder_def def = {.folder = w.out, .formats = formats, .format_count = 5};
-        if (drape_recorder_create(w.ctx, w.sim, &def, &recorder) == DRAPE_OK &&
-            drape_sim_observe(w.sim, kill_at_frame_5, NULL) == DRAPE_OK)
-            drape_sim_advance(w.sim, 1);
-        _exit(1);
-    }
-    int end = 0;
-    ck_assert_int_eq(waitpid(child, &end, 0), child);
-    ck_assert(WIFSIGNALED(end) && WTERMSIG(end) == SIGKILL);
-    ck_assert_int_eq(read_npy(w.out, &data), 6);
-    free(data);
-    ck_assert_int_eq(count_files(w.out, ".obj"), 6 + 1);
-    ck_assert_int_eq(count_files(w.out, ".vtp"), 6);
-    data = slurp(in_folder(w.out, "frames.pvd"), &size);
-    ck_assert_ptr_nonnull(strstr(data, "frame_000005.vtp\"/>\n</Collection></VTKFile>\n"));
-    free(data);
-    data = slurp(in_folder(w.out, "positions.pc2"), &size);
-    ck_assert_uint_eq(word_at(data, 28), 6);
-    free(data);
-    json_t *json = load_glb(&w);
-    ck_assert_uint_eq(count_targets(json), 5);
-    json_decref(json);
-    data = slurp(in_folder(w.out, "steps.csv"), &size);
-    ck_assert_uint_gt(size, strlen(columns));
-    ck_assert_int_eq(data[size - 1], '\n');
-    free(data);
-    data = slurp(in_folder(w.out, "energy.csv"), &size);
-    ck_assert_uint_gt(size, strlen(energy_columns));
-    ck_assert_int_eq(data[size - 1], '\n');
-    free(data);
     tear_down(&w);
 }
 END_TEST
@@ -1288,7 +1159,7 @@ START_TEST(summary_fails_whole)
     free_disk(&old);
     ck_assert_int_eq(status, DRAPE_E_FILE);
     ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "s.json\": File too large"));
-    char *data = slurp(path, &size);
+    char *data = file_read(path, &size);
     ck_assert_str_eq(data, "before");
     free(data);
     ck_assert_int_eq(count_files(w.folder, ".part"), 0);
@@ -1322,7 +1193,7 @@ START_TEST(numbers_do_not_follow_the_locale)
     json_t *json = load_summary(in_folder(w.out, "s.json"));
     ck_assert_double_eq(real(json, "wall_s", "total"), 0.5);
     json_decref(json);
-    char *data = slurp(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns),
+    char *data = file_read(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns),
          *field[FIELDS + 1];
     ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
     check_number(field[2], w.seen.attempt[0].h);
@@ -1373,13 +1244,12 @@ START_TEST(any_name_is_found_again)
 }
 END_TEST
 
-SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_once, obj_parses_back,
-      ply_parses_back, every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
-      energies_are_of_the_state_at_or_after_the_frame, full_disk_leaves_whole_rows_of_energies,
-      steps_has_a_row_for_each_attempt, steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy,
-      full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, full_disk_leaves_a_valid_point_cache,
-      full_disk_leaves_a_valid_glb, full_disk_leaves_a_valid_collection,
-      a_disk_full_from_the_start_is_reported_at_once, bad_folders_are_refused,
-      unknown_formats_are_refused_before_anything_is_made, too_many_observers_are_reported,
-      a_killed_run_leaves_whole_files, each_allocation_may_fail, summary_is_complete, summary_is_always_json,
-      summary_fails_whole, numbers_do_not_follow_the_locale, any_name_is_found_again)
+SUITE("io", npy_is_exact, the_last_frame_comes_once, obj_parses_back, ply_parses_back,
+      every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
+      energies_are_of_the_state_at_or_after_the_frame, steps_has_a_row_for_each_attempt,
+      steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy, full_disk_leaves_whole_rows,
+      full_disk_leaves_no_half_frame, full_disk_leaves_a_valid_point_cache, full_disk_leaves_a_valid_glb,
+      full_disk_leaves_a_valid_collection, a_disk_full_from_the_start_is_reported_at_once,
+      bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made, each_allocation_may_fail,
+      summary_is_complete, summary_is_always_json, summary_fails_whole, numbers_do_not_follow_the_locale,
+      any_name_is_found_again)

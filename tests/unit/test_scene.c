@@ -102,30 +102,6 @@ static void check_vector(const double *vector, double x, double y, double z)
     ck_assert_double_eq(vector[2], z);
 }
 
-START_TEST(test_example_scene)
-{
-    open_context();
-    ck_assert_msg(read_quoted(example) == DRAPE_OK, "%s", message());
-    ck_assert_uint_eq(def.struct_size, sizeof def);
-    check_vector(def.gravity, 0, -9.81, 0);
-    ck_assert_double_eq(def.duration, 5);
-    ck_assert_double_eq(def.frame_rate, 30);
-    ck_assert_ptr_null(def.folder);
-    ck_assert_uint_eq(def.format_count, 2);
-    ck_assert_str_eq(def.formats[0], "npy");
-    ck_assert_str_eq(def.formats[1], "obj");
-    ck_assert_str_eq(def.integrator.type, "ida");
-    ck_assert_uint_eq(def.integrator.setting_count, 5);
-    check_setting(&def.integrator.settings[0], "dt", 0.01, NULL);
-    check_setting(&def.integrator.settings[2], "max_iterations", 50, NULL);
-    check_setting(&def.integrator.settings[3], "linear_solver", 0, "klu");
-    check_setting(&def.integrator.settings[4], "accept", 0, "true");
-    ck_assert_str_eq(def.controller.type, "fixed");
-    check_setting(&def.controller.settings[0], "dt_min", 1e-7, NULL);
-    close_context();
-}
-END_TEST
-
 START_TEST(test_example_cloth)
 {
     open_context();
@@ -152,27 +128,6 @@ START_TEST(test_example_cloth)
 }
 END_TEST
 
-START_TEST(test_example_pins)
-{
-    open_context();
-    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
-    const drape_pin_def *pins = def.cloths[0].pins;
-    ck_assert_uint_eq(def.cloths[0].pin_count, 3);
-    ck_assert_uint_eq(pins[0].node_count, 2);
-    ck_assert_int_eq(pins[0].nodes[1], 506);
-    ck_assert_int_eq(pins[0].row, -1);
-    ck_assert_ptr_null(pins[0].corner);
-    ck_assert_uint_eq(pins[0].key_count, 0);
-    ck_assert_str_eq(pins[1].corner, "top-left");
-    ck_assert_int_eq(pins[1].row, -1);
-    ck_assert_int_eq(pins[2].row, 0);
-    ck_assert_uint_eq(pins[2].key_count, 2);
-    ck_assert_double_eq(pins[2].track[1].time, 1);
-    check_vector(pins[2].track[1].displacement, 0, 0.2, 0);
-    close_context();
-}
-END_TEST
-
 #define MESH_SCENE(mesh)       "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': " mesh "}]}"
 #define TRANSFORMED(transform) MESH_SCENE("{'file': 'a/b.obj', 'transform': {" transform "}}")
 
@@ -195,27 +150,6 @@ START_TEST(test_transforms)
     check_vector(mesh->scale, 1, 2, 1e-3);
     ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, 0, 0]")), 0);
     ck_assert_double_eq(def.cloths[0].mesh.rotate[3], 0);
-    close_context();
-}
-END_TEST
-
-START_TEST(test_defaults)
-{
-    open_context();
-    ck_assert_int_eq(
-        read_quoted("{'drape': 1, 'duration': 1e9, 'cloth': [{'mesh': {'grid': 'g'}, 'pins': [], "
-                    "'terms': []}], 'integrator': {'dt': -0}}"),
-        DRAPE_OK);
-    check_vector(def.gravity, 0, -9.81, 0);
-    ck_assert_double_eq(def.frame_rate, 60);
-    ck_assert_str_eq(def.integrator.type, "be");
-    check_setting(&def.integrator.settings[0], "dt", -0.0, NULL);
-    ck_assert_str_eq(def.controller.type, "halving");
-    ck_assert_uint_eq(def.controller.setting_count, 0);
-    ck_assert_uint_eq(def.format_count, 1);
-    ck_assert_str_eq(def.formats[0], "npy");
-    ck_assert_ptr_null(def.cloths[0].name);
-    ck_assert_uint_eq(def.cloths[0].pin_count + def.cloths[0].term_count + def.cloths[0].material_count, 0);
     close_context();
 }
 END_TEST
@@ -268,29 +202,6 @@ START_TEST(test_numbers)
     check_vector(pins[1].box_min, -1, 0, 2.5);
     check_vector(pins[1].box_max, 1, 1, 3);
     close_context();
-}
-END_TEST
-
-/* A caller compiled with an older header has shorter structs: nothing is written beyond them. */
-START_TEST(test_def_sizes)
-{
-    struct {
-        drape_scene_def def;
-        char beyond;
-    } longer;
-    memset(&def, 7, sizeof def);
-    drape_scene_def_init(&def, offsetof(drape_scene_def, duration));
-    ck_assert_uint_eq(def.struct_size, offsetof(drape_scene_def, duration));
-    ck_assert_str_eq(def.controller.type, "halving");
-    ck_assert_int_eq(*(unsigned char *)&def.duration, 7);
-    memset(&longer, 7, sizeof longer);
-    drape_scene_def_init(&longer.def, sizeof longer);
-    ck_assert_uint_eq(longer.def.struct_size, sizeof longer);
-    ck_assert_int_eq(longer.beyond, 0);
-    drape_cloth_def cloth;
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    check_vector(cloth.mesh.scale, 1, 1, 1);
-    drape_pin_def_init(NULL, sizeof(drape_pin_def));
 }
 END_TEST
 
@@ -404,11 +315,9 @@ static const struct {
 } wrong_scenes[] = {
     /* syntax */
     {"", "s.json: the scene is empty"},
-    {"  \n", "s.json: the scene is empty"},
     {"'text'", "s.json:1:1: '{' expected near '\"text\"'"},
     {"[1, 2]", "s.json:1:1: a scene is an object, {...}"},
     {"{'drape': 1", "s.json:1:12: '}' expected near end of file"},
-    {"{'drape': 1\n", "s.json:1:12: '}' expected near end of file"},
     {"{'drape': 1,}", "s.json:1:13: string or '}' expected near '}'"},
     {"{'drape': 1 'duration': 1}", "s.json:1:13: '}' expected near '\"duration\"'"},
     {"{'drape' 1}", "s.json:1:10: ':' expected near '1'"},
@@ -435,21 +344,14 @@ static const struct {
     {"{'drape': 1 /}", "s.json:1:13: '}' expected near '/'"},
     {"{'drape': nul}", "s.json:1:11: invalid token near 'nul'"},
     {"{'drape': True}", "s.json:1:11: invalid token near 'True'"},
-    {"\xff\xfe"
-     "{",
-     "s.json:1:1: byte 0xff is not UTF-8"},
     {"{'drape': [1, 2}", "s.json:1:16: ']' expected near '}'"},
-    {"// only a remark", "s.json: the scene is empty"},
     /* the scene */
     {"{}", "s.json:1:1: /drape: \"drape\" is missing: version of the scene format; the number 1"},
     {"{'drape': 2, 'newer': 1}", "s.json:1:2: /drape: a scene of version 2; this library reads version 1"},
     {"{'drape': '1'}", "s.json:1:2: /drape: \"1\" is not allowed; drape is the number 1"},
-    {"{'drape': null}", "s.json:1:2: /drape: null is not allowed; drape is the number 1"},
     {"{'drape': 1}", "s.json:1:1: /cloth: \"cloth\" is missing: the pieces of cloth; an array of objects, at "
                      "least one, at most 1048576"},
     {"{'drape': 1, 'cloth': []}", "s.json:1:14: /cloth: an empty array is not allowed; cloth is an array of "
-                                  "objects, at least one, at most 1048576"},
-    {"{'drape': 1, 'cloth': {}}", "s.json:1:14: /cloth: an object is not allowed; cloth is an array of "
                                   "objects, at least one, at most 1048576"},
     {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
      "s.json:1:1: /duration: \"duration\" is missing: simulated time; a number in (0, 1e9] s"},
@@ -460,17 +362,11 @@ static const struct {
      "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"? Known: <*>"},
     {ROOT("'colliders': 3"),
      "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects, at most 4096"},
-    {ROOT("'colliders': ['plane']"),
-     "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
     {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: name of a "
                                 "collider; its parameters are keys beside "
                                 "it; a non-empty string"},
     {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
      "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
-    {ROOT("'colliders': [{'type': 's', 'friction': 1000.5}]"),
-     "s.json:2:29: /colliders/0/friction: 1000.5 is not allowed; friction is a number in [0, 1000]"},
-    {ROOT("'colliders': [{'type': 's', 'friction': true}]"),
-     "s.json:2:29: /colliders/0/friction: true is not allowed; friction is a number in [0, 1000]"},
     {ROOT("'colliders': [{'type': 's', 'center': [0, '1', 2]}]"),
      "s.json:2:43: /colliders/0/center/1: \"1\" is not allowed; an element is a number"},
     {ROOT("'colliders': [{'type': 's', 'track': [[0, [0, 0, 0]], [0, [1, 0, 0]]]}]"),
@@ -479,9 +375,6 @@ static const struct {
      "before, 0"},
     {ROOT("'self_contact': 0.01"),
      "s.json:2:1: /self_contact: 0.01 is not allowed; self_contact is an object"},
-    {ROOT("'contact': []"), "s.json:2:1: /contact: an empty array is not allowed; contact is an object"},
-    {ROOT("'Gravity': [0, 0, 0]"),
-     "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"? Known: <*>"},
     {ROOT("'output': {'a/b~c': 1}"),
      "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats<*>"},
     {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, <*>"},
@@ -489,150 +382,57 @@ static const struct {
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
     {ROOT("'gravity': 9.81"), "s.json:2:1: /gravity: 9.81 is not allowed; gravity is [x, y, z], each in "
                               "[-1e9, 1e9] m/s2"},
-    {ROOT("'gravity': [0, -9.81]"), "s.json:2:1: /gravity: an array of 2 is not allowed; gravity is [x, y, "
-                                    "z], each in [-1e9, 1e9] m/s2"},
-    {ROOT("'gravity': [0, '-9.81', 0]"),
-     "s.json:2:16: /gravity/1: \"-9.81\" is not allowed; an element is a number"},
-    {ROOT("'integrator': 'be'"), "s.json:2:1: /integrator: \"be\" is not allowed; integrator is an object"},
     {ROOT("'integrator': {'method': 1}"),
      "s.json:2:16: /integrator/method: 1 is not allowed; method is a non-empty string"},
-    {ROOT("'integrator': {'method': ''}"),
-     "s.json:2:16: /integrator/method: \"\" is not allowed; method is a non-empty string"},
-    {ROOT("'integrator': {'dt': [null]}"),
-     "s.json:2:23: /integrator/dt/0: null is not allowed; an element is a number"},
     {ROOT("'controller': {'dt_min': null}"),
      "s.json:2:16: /controller/dt_min: null is not allowed; a setting is a number, true, false, a string or "
      "an array of numbers or pairs"},
-    {ROOT("'controller': []"),
-     "s.json:2:1: /controller: an empty array is not allowed; controller is an object"},
-    {"{'drape': 1, 'duration': 0, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: 0 is not allowed; duration is a number in (0, 1e9] s"},
-    {"{'drape': 1, 'duration': -0.1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: -0.1 is not allowed; duration is a number in (0, 1e9] s"},
-    {"{'drape': 1, 'duration': 1000000001, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: 1000000001 is not allowed; duration is a number in (0, 1e9] s"},
-    {"{'drape': 1, 'duration': '5', 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:14: /duration: \"5\" is not allowed; duration is a number in (0, 1e9] s"},
-    {ROOT("'frame_rate': 0"),
-     "s.json:2:1: /frame_rate: 0 is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
-    {ROOT("'frame_rate': 1e7"),
-     "s.json:2:1: /frame_rate: 10000000 is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
-    {ROOT("'frame_rate': true"),
-     "s.json:2:1: /frame_rate: true is not allowed; frame_rate is a number in (0, 1e6] 1/s"},
-    {ROOT("'output': ['npy']"), "s.json:2:1: /output: an array of 1 is not allowed; output is an object"},
-    {ROOT("'output': {'format': ['npy']}"),
-     "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"? Known: <*>"},
     {ROOT("'output': {'formats': 'npy'}"),
      "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array, each a non-empty string"},
     {ROOT("'output': {'formats': ['npy', '']}"),
      "s.json:2:31: /output/formats/1: \"\" is not allowed; an element is a non-empty string"},
-    {ROOT("'output': {'formats': [1]}"),
-     "s.json:2:24: /output/formats/0: 1 is not allowed; an element is a non-empty string"},
     /* cloth */
-    {CLOTH("'name': ''"), "s.json:2:1: /cloth/0/name: \"\" is not allowed; name is a non-empty string"},
-    {CLOTH("'name': 3"), "s.json:2:1: /cloth/0/name: 3 is not allowed; name is a non-empty string"},
-    {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"? Known: <*>"},
-    {CLOTH("'material': []"),
-     "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
-    {CLOTH("'material': {'density': {}}"),
-     "s.json:2:14: /cloth/0/material/density: an object is not "
-     "allowed; a setting is a number, true, false, a string or an array of numbers or pairs"},
-    {CLOTH("'material': {'a/b': [true]}"),
-     "s.json:2:22: /cloth/0/material/a~1b/0: true is not allowed; an element is a number"},
     {CLOTH("'material': {'warp_curve': [[1, 2], [3]]}"),
      "s.json:2:37: /cloth/0/material/warp_curve/1: an array of 1 is not allowed; an element is an array of "
      "two "
      "numbers"},
-    {CLOTH("'material': {'warp_curve': [[1, 2], 3]}"),
-     "s.json:2:37: /cloth/0/material/warp_curve/1: 3 is not allowed; an element is an array of two numbers"},
     {CLOTH("'terms': 'stretch.edge'"), "s.json:2:1: /cloth/0/terms: \"stretch.edge\" is not allowed; terms "
                                        "is an array of names, or objects with a \"type\""},
     {CLOTH("'terms': ['']"), "s.json:2:11: /cloth/0/terms/0: \"\" is not allowed; an element is a name, or "
                              "an object with a \"type\""},
-    {CLOTH("'terms': [3]"),
-     "s.json:2:11: /cloth/0/terms/0: 3 is not allowed; an element is a name, or an object with a \"type\""},
     {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
      "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a non-empty string"},
-    {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
-     "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
-     "string or an array of numbers or pairs"},
-    {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
-                                        "velocity is [x, y, z], each in [-1e9, 1e9] m/s"},
-    {CLOTH("'velocity': [null, 2, 3]"),
-     "s.json:2:14: /cloth/0/velocity/0: null is not allowed; an element is a number"},
     {CLOTH("'pins': []}, {'name': 'cloth0', 'mesh': {'grid': 'g'}"),
      "s.json:2:15: /cloth/1/name: \"cloth0\" is the name of another cloth"},
-    {CLOTH("'name': 'a'}, {'mesh': {'grid': 'g'}}, {'name': 'a', 'mesh': {'grid': 'g'}"),
-     "s.json:2:41: /cloth/2/name: \"a\" is the name of another cloth"},
     /* mesh */
-    {MESH("[]"), "s.json:1:40: /cloth/0/mesh: an empty array is not allowed; mesh is an object"},
     {MESH("{}"), "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: none"},
     {MESH("{'edges': 22}"),
      "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, <*>"},
-    {MESH("{'gird': 'square', 'rows': 3}"),
-     "s.json:2:2: /cloth/0/mesh/gird: unknown key \"gird\"; did you mean \"grid\"? Known: <*>"},
     {MESH("{'grid': 'square', 'file': 'x.obj'}"),
      "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
-    {MESH("{'file': 'x.obj', 'rows': 3}"),
-     "s.json:2:19: /cloth/0/mesh/rows: unknown key \"rows\" without \"grid\"; known: grid, <*>"},
-    {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a non-empty string"},
-    {MESH("{'file': ''}"), "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a non-empty string"},
-    {MESH("{'grid': 'g', 'rows': ['3']}"),
-     "s.json:2:24: /cloth/0/mesh/rows/0: \"3\" is not allowed; an element is a number"},
-    {MESH("{'grid': 'g', 'transform': []}"),
-     "s.json:2:15: /cloth/0/mesh/transform: an empty array is not allowed; transform is an object"},
-    {MESH("{'grid': 'g', 'transform': {'translation': [0, 0, 0]}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/translation: unknown key \"translation\"; did you mean "
-     "\"translate\"? Known: <*>"},
     {MESH("{'grid': 'g', 'transform': {'translate': 1}}"),
      "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is [x, y, z], each in "
      "(-inf, inf) m"},
     {MESH("{'grid': 'g', 'transform': {'rotate': 90}}"),
      "s.json:2:29: /cloth/0/mesh/transform/rotate: 90 is not allowed; rotate is [x, y, z, angle], or [x, y, "
      "z] whose length is the angle, which is in (-inf, inf) degrees"},
-    {MESH("{'grid': 'g', 'transform': {'rotate': [0, 90]}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/rotate: an array of 2 is not allowed; rotate is [x, y, z, angle], "
-     "or [x, y, z] whose length is the angle, which is in (-inf, inf) degrees"},
-    {MESH("{'grid': 'g', 'transform': {'rotate': [0, 1, 0, '90']}}"),
-     "s.json:2:49: /cloth/0/mesh/transform/rotate/3: \"90\" is not allowed; an element is a number"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [1e308, 1e308, 1e308]}}"),
      "s.json:2:29: /cloth/0/mesh/transform/rotate: the rotation vector is too long"},
     {MESH("{'grid': 'g', 'transform': {'scale': '2'}}"),
      "s.json:2:29: /cloth/0/mesh/transform/scale: \"2\" is not allowed; scale is a number or [x, y, z], each "
      "in (0, inf)"},
-    {MESH("{'grid': 'g', 'transform': {'scale': [1, 2]}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/scale: an array of 2 is not allowed; scale is a number or [x, y, "
-     "z], each in (0, inf)"},
     /* pins */
     {CLOTH("'pins': {}"), "s.json:2:1: /cloth/0/pins: an object is not allowed; pins is an array of objects"},
-    {CLOTH("'pins': ['top']"),
-     "s.json:2:10: /cloth/0/pins/0: \"top\" is not allowed; an element is an object"},
     {CLOTH("'pins': [{}]"),
      "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, corner, edge, row, box is needed; given: none"},
-    {CLOTH("'pins': [{'node': 1}]"),
-     "s.json:2:11: /cloth/0/pins/0/node: unknown key \"node\"; did you mean \"nodes\"? Known: <*>"},
     {CLOTH("'pins': [{'row': 0, 'nodes': [1]}]"), "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, "
                                                   "corner, edge, row, box is needed; given: nodes, row"},
     {CLOTH("'pins': [{'nodes': 1}]"), "s.json:2:11: /cloth/0/pins/0/nodes: 1 is not allowed; nodes is an "
                                       "array, each an integer in [0, 2147483647], at least one"},
-    {CLOTH("'pins': [{'nodes': []}]"), "s.json:2:11: /cloth/0/pins/0/nodes: an empty array is not allowed; "
-                                       "nodes is an array, each an integer in [0, 2147483647], at least one"},
     {CLOTH("'pins': [{'nodes': [0, 1.5]}]"),
      "s.json:2:24: /cloth/0/pins/0/nodes/1: 1.5 is not allowed; an element is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'nodes': [0, 2147483648]}]"), "s.json:2:24: /cloth/0/pins/0/nodes/1: 2147483648 is not "
-                                                    "allowed; an element is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'nodes': [-1]}]"),
-     "s.json:2:21: /cloth/0/pins/0/nodes/0: -1 is not allowed; an element is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'nodes': ['a']}]"), "s.json:2:21: /cloth/0/pins/0/nodes/0: \"a\" is not allowed; an "
-                                          "element is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'row': -1}]"),
      "s.json:2:11: /cloth/0/pins/0/row: -1 is not allowed; row is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'row': 0.5}]"),
-     "s.json:2:11: /cloth/0/pins/0/row: 0.5 is not allowed; row is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'row': '0'}]"),
-     "s.json:2:11: /cloth/0/pins/0/row: \"0\" is not allowed; row is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'row': 99999999999999999999}]"),
-     "s.json:2:11: /cloth/0/pins/0/row: 1e20 is not allowed; row is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'corner': 0}]"), "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is one "
                                        "of: top-left, top-right, bottom-left, bottom-right"},
     {CLOTH("'pins': [{'edge': ['top']}]"), "s.json:2:11: /cloth/0/pins/0/edge: an array of 1 is not allowed; "
@@ -641,16 +441,9 @@ static const struct {
      "s.json:2:19: /cloth/0/pins/0/box/0: 0 is not allowed; a corner is three numbers, [x, y, z]"},
     {CLOTH("'pins': [{'box': [[0, 0, 0]]}]"), "s.json:2:11: /cloth/0/pins/0/box: an array of 1 is not "
                                               "allowed; box is two corners, [[x, y, z], [x, y, z]], in m"},
-    {CLOTH("'pins': [{'box': [[0, 0, 0], [1, 1]]}]"), "s.json:2:30: /cloth/0/pins/0/box/1: an array of 2 is "
-                                                      "not allowed; a corner is three numbers, [x, y, z]"},
-    {CLOTH("'pins': [{'box': [[0, 0, 0], [1, true, 1]]}]"),
-     "s.json:2:34: /cloth/0/pins/0/box/1/1: true is not allowed; an element is a number"},
     {CLOTH("'pins': [{'row': 0, 'track': []}]"),
      "s.json:2:21: /cloth/0/pins/0/track: an empty array is not allowed; track is an array of [time, [x, y, "
      "z]], in s and m, at least one"},
-    {CLOTH("'pins': [{'row': 0, 'track': 'up'}]"),
-     "s.json:2:21: /cloth/0/pins/0/track: \"up\" is not allowed; track is an array of [time, [x, y, z]], in "
-     "s and m, at least one"},
     {CLOTH("'pins': [{'row': 0, 'track': [[0]]}]"), "s.json:2:31: /cloth/0/pins/0/track/0: an array of 1 is "
                                                     "not allowed; a key of a track is [time, [x, y, z]]"},
     {CLOTH("'pins': [{'row': 0, 'track': [['0', [0, 0, 0]]]}]"),
@@ -658,68 +451,7 @@ static const struct {
     {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0]]]}]"),
      "s.json:2:35: /cloth/0/pins/0/track/0/1: an array of 2 is not allowed; a displacement is three numbers, "
      "[x, y, z]"},
-    {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0, {}]]]}]"),
-     "s.json:2:42: /cloth/0/pins/0/track/0/1/2: an object is not allowed; an element is a number"},
-    {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0, 0]], [0, [1, 0, 0]]]}]"),
-     "s.json:2:48: /cloth/0/pins/0/track/1/0: 0 is not allowed; the time of a key is greater than that of "
-     "the key before, 0"},
-    {CLOTH("'pins': [{'row': 0, 'track': [[1.5, [0, 0, 0]], [-1, [1, 0, 0]]]}]"),
-     "s.json:2:50: /cloth/0/pins/0/track/1/0: -1 is not allowed; the time of a key is greater than that of "
-     "the key before, 1.5"},
-    {CLOTH("'pins': [{'row': 0, 'tracks': []}]"),
-     "s.json:2:21: /cloth/0/pins/0/tracks: unknown key \"tracks\"; did you mean \"track\"? Known: <*>"},
 };
-
-static const char obstacles[] =
-    "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}], 'colliders': ["
-    "{'type': 'sphere', 'center': [0.5, 0.2, -1], 'radius': 0.2, 'friction': 0.3},"
-    "{'type': 'box', 'name': 'step', 'size': 2, 'rotate': [0, 1, 0, 30],"
-    " 'track': [[0, [0, 0, 0]], [2, [0, 1, 0]]]}, {'type': 'mesh', 'file': 'a.obj'}],"
-    "'self_contact': {'thickness': 0.0095}, 'contact': {'friction': 'lagged', 'distance': 0.002}}";
-
-static void check_numbers(const drape_setting *setting, const char *name, size_t count, const double *numbers)
-{
-    ck_assert_str_eq(setting->name, name);
-    ck_assert_ptr_null(setting->text);
-    ck_assert_uint_eq(setting->vector_count, count);
-    for (size_t i = 0; i < count; i++)
-        ck_assert_double_eq(setting->vector[i], numbers[i]);
-}
-
-START_TEST(test_colliders_and_contact)
-{
-    open_context();
-    ck_assert_msg(read_quoted(obstacles) == DRAPE_OK, "%s", message());
-    ck_assert_uint_eq(def.collider_count, 3);
-    const drape_collider_def *sphere = &def.colliders[0], *box = &def.colliders[1], *mesh = &def.colliders[2];
-    ck_assert_str_eq(sphere->entry.type, "sphere");
-    ck_assert_ptr_null(sphere->name);
-    ck_assert_double_eq(sphere->friction, 0.3);
-    ck_assert_uint_eq(sphere->key_count, 0);
-    ck_assert_uint_eq(sphere->entry.setting_count, 2);
-    check_numbers(&sphere->entry.settings[0], "center", 3, (const double[]){0.5, 0.2, -1});
-    check_setting(&sphere->entry.settings[1], "radius", 0.2, NULL);
-    ck_assert_ptr_null(sphere->entry.settings[1].vector);
-    ck_assert_str_eq(box->name, "step");
-    ck_assert_double_eq(box->friction, 0);
-    check_setting(&box->entry.settings[0], "size", 2, NULL);
-    check_numbers(&box->entry.settings[1], "rotate", 4, (const double[]){0, 1, 0, 30});
-    ck_assert_uint_eq(box->key_count, 2);
-    ck_assert_double_eq(box->track[1].time, 2);
-    check_vector(box->track[1].displacement, 0, 1, 0);
-    check_setting(&mesh->entry.settings[0], "file", 0, "a.obj");
-    ck_assert_uint_eq(def.self_contact_count, 1);
-    check_setting(&def.self_contact[0], "thickness", 0.0095, NULL);
-    ck_assert_uint_eq(def.contact_count, 2);
-    check_setting(&def.contact[0], "friction", 0, "lagged");
-    /* an empty object is not the same as an absent one: it lacks its thickness */
-    ck_assert_int_eq(read_quoted(ROOT("'self_contact': {}")), DRAPE_OK);
-    ck_assert(def.self_contact && def.self_contact_count == 0);
-    ck_assert_int_eq(read_quoted(ROOT("'colliders': []")), DRAPE_OK);
-    ck_assert(!def.self_contact && !def.contact && def.collider_count == 0);
-    close_context();
-}
-END_TEST
 
 START_TEST(test_wrong_scenes)
 {
@@ -771,23 +503,6 @@ START_TEST(test_deep_nesting)
 }
 END_TEST
 
-/* Every prefix of a scene, and scenes with one byte changed, give a result or a message of one line. */
-START_TEST(test_truncations)
-{
-    open_context();
-    char *text = strdup(with_quotes(example));
-    for (size_t length = strlen(text); length-- > 0;) {
-        text[length] = 0;
-        if (read_text(text) != DRAPE_OK)
-            check_one_line(message());
-        else
-            ck_assert_uint_eq(length, sizeof example - 2); /* without the last newline */
-    }
-    free(text);
-    close_context();
-}
-END_TEST
-
 static uint32_t next_random(uint64_t *state)
 {
     *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407); /* Knuth's MMIX */
@@ -834,14 +549,6 @@ static const struct {
      "s.json: set /duration=-1: /duration: -1 is not allowed; duration is a number in (0, 1e9] s"},
     {"/duration", "",
      "s.json: set /duration=: /duration: \"\" is not allowed; duration is a number in (0, 1e9] s"},
-    {"/duration", "1e999",
-     "s.json: set /duration=1e999: /duration: \"1e999\" is not allowed; duration is a number in (0, 1e9] s"},
-    {"/duration", "-.5",
-     "s.json: set /duration=-.5: /duration: -0.5 is not allowed; duration is a number in (0, 1e9] s"},
-    {"/duration", "-.",
-     "s.json: set /duration=-.: /duration: \"-.\" is not allowed; duration is a number in (0, 1e9] s"},
-    {"/duration", "+-1",
-     "s.json: set /duration=+-1: /duration: \"+-1\" is not allowed; duration is a number in (0, 1e9] s"},
     {"/gravity", "[0, 0]",
      "s.json: set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is [x, y, z], each in "
      "[-1e9, 1e9] m/s2"},
@@ -921,27 +628,6 @@ START_TEST(test_set_loose_numbers)
         ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
         ck_assert_double_eq(def.duration, numbers[i].value);
     }
-    close_context();
-}
-END_TEST
-
-START_TEST(test_set_values)
-{
-    open_context();
-    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, "/integrator", "{\"method\": \"be\"}"), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, "/integrator/max_iterations", "7"), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/pins/-/nodes/-", "5"), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/pins/3/nodes/-", "6"), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/terms/0", "drag"), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
-    ck_assert_str_eq(def.integrator.type, "be");
-    ck_assert_uint_eq(def.integrator.setting_count, 1);
-    check_setting(&def.integrator.settings[0], "max_iterations", 7, NULL);
-    ck_assert_uint_eq(def.cloths[0].pin_count, 4);
-    ck_assert_uint_eq(def.cloths[0].pins[3].node_count, 2);
-    ck_assert_int_eq(def.cloths[0].pins[3].nodes[1], 6);
-    ck_assert_str_eq(def.cloths[0].terms[0].type, "drag");
     close_context();
 }
 END_TEST
@@ -1103,46 +789,7 @@ START_TEST(test_remove)
 }
 END_TEST
 
-START_TEST(test_arguments)
-{
-    open_context();
-    ck_assert_int_eq(drape_scene_load(NULL, "a", &scene), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_load(ctx, NULL, &scene), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_load(ctx, "a", NULL), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_parse(NULL, "{}", "a", &scene), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_parse(ctx, NULL, "a", &scene), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_parse(ctx, "{}", "a", NULL), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_set(NULL, "/a", "1"), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_parse(ctx, "{}", NULL, &scene), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_set(scene, NULL, "1"), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_set(scene, "/a", NULL), DRAPE_E_ARGUMENT);
-    drape_scene_destroy(&scene);
-    drape_scene_destroy(&scene);
-    drape_scene_destroy(NULL);
-    close_context();
-}
-END_TEST
-
 /* ---- Size, locale, memory ---- */
-
-START_TEST(test_many_nodes)
-{
-    enum { COUNT = 1000000 };
-    open_context();
-    char *text = malloc(8 * COUNT + 200), *p = text;
-    p += sprintf(
-        p,
-        "{\"drape\": 1, \"duration\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"g\"}, \"pins\": [{\"nodes\": [");
-    for (int i = 0; i < COUNT; i++)
-        p += sprintf(p, "%s%d", i ? "," : "", i);
-    sprintf(p, "]}]}]}");
-    ck_assert_int_eq(read_text(text), DRAPE_OK);
-    ck_assert_uint_eq(def.cloths[0].pins[0].node_count, COUNT);
-    ck_assert_int_eq(def.cloths[0].pins[0].nodes[COUNT - 1], COUNT - 1);
-    free(text);
-    close_context();
-}
-END_TEST
 
 /* A locale with a decimal comma must not affect numbers. */
 START_TEST(test_locale)
@@ -1423,9 +1070,7 @@ START_TEST(test_every_key)
 }
 END_TEST
 
-SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
-      test_host_defaults, test_numbers, test_def_sizes, test_comments, test_places, test_mend_end,
-      test_colliders_and_contact, test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations,
-      test_mutations, test_sets, test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault,
-      test_files, test_pipe, test_remove, test_arguments, test_many_nodes, test_locale, test_no_memory,
-      test_no_memory_for_json, test_form, test_every_key)
+SUITE("scene", test_example_cloth, test_transforms, test_host_defaults, test_numbers, test_comments,
+      test_places, test_mend_end, test_wrong_scenes, test_long_texts, test_deep_nesting, test_mutations,
+      test_sets, test_set_loose_numbers, test_set_order, test_locate_fault, test_files, test_pipe,
+      test_remove, test_locale, test_no_memory, test_no_memory_for_json, test_form, test_every_key)
