@@ -3,11 +3,13 @@
 DRAPE_BUILD is the build folder, DRAPE_SOURCE the source folder; or: test_x.py PROGRAM [SOURCES]. A test is a function test_*; its
 docstring is its name; with ONLY=PATTERN those run in whose names the pattern is found. Everything is written below a temporary folder. Output is TAP.
 """
+import contextlib
 import csv
 import json
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import traceback
 SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
 PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
 SOURCES = os.path.abspath(SOURCES)
+PRELOAD = os.path.dirname(PROGRAM) + "/tests/libpreload.so"
 LIMIT = 300  # [s] for one call: sanitizers are slow
 
 
@@ -77,20 +80,53 @@ def refused(*args, says="", **options):
     return result.stderr
 
 
-def signalled(one, path, *args):
-    """A run of scene.json into the folder out that receives a signal once a file is there. Returns the exit code. A run that was complete by then
-    is repeated: on a busy machine this process may sleep for longer than the run takes."""
-    for _ in range(20):
-        shutil.rmtree("out", ignore_errors=True)
-        with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-            end = time.monotonic() + LIMIT
-            while not os.path.exists(path) and process.poll() is None and time.monotonic() < end:
-                time.sleep(0.002)
-            process.send_signal(one)
-            process.wait(timeout=LIMIT)
-        if process.returncode:
-            break
-    return process.returncode
+def meddling(**how):
+    """The environment of a call in which something goes wrong at a moment that is counted, not timed: preload.c says what, as signal=2, call=100."""
+    env = {**os.environ, "LD_PRELOAD": PRELOAD, **{"DRAPE_" + key.upper(): str(value) for key, value in how.items()}}
+    if "ASAN_OPTIONS" in env:
+        env["ASAN_OPTIONS"] += ":verify_asan_link_order=0"
+    return env
+
+
+def meddled(*args, **how):
+    return drape(*args, env=meddling(**how))
+
+
+def calls_of(*args):
+    """How many calls of a good run of these arguments preload.c counts."""
+    result = meddled(*args, count="count")
+    equal((result.returncode, without_warnings(result.stderr)), (0, ""), " ".join(args))
+    with open("count", encoding="ascii") as file:
+        count = int(file.read().split()[1])
+    os.remove("count")
+    return count
+
+
+def signalled(one, name, *args):
+    """A run of scene.json into the folder out that receives a signal once a file of that name is there. Returns the exit code."""
+    shutil.rmtree("out", ignore_errors=True)
+    return meddled("run", "scene.json", "--out", "out", *args, signal=int(one), file=name).returncode
+
+
+@contextlib.contextmanager
+def stopped(*args, **how):
+    """A process of the program that has stopped itself (SIGSTOP) at a counted moment; it ends with the context."""
+    with subprocess.Popen([PROGRAM, *args], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                          env=meddling(signal=int(signal.SIGSTOP), **how)) as child:
+        try:
+            assert os.WIFSTOPPED(os.waitpid(child.pid, os.WUNTRACED)[1]), f"{' '.join(args)}: it has ended"
+            yield child
+        finally:
+            child.kill()
+
+
+def wait_for(condition, child):
+    """Waits until a condition holds, which it must while the process still runs."""
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert child.poll() is None, f"it has ended with {child.returncode}"
+        assert time.monotonic() < end, f"{LIMIT} s have passed"
+        time.sleep(0.002)
 
 
 def read_json(path):

@@ -38,7 +38,7 @@ def same(one, other):
 
 def stopped(kind):
     """A run with all formats that receives a signal after its first checkpoint. Returns the exit code."""
-    return signalled(kind, "out/checkpoint.drape", "--format", ALL, "--checkpoint-every", "1")
+    return signalled(kind, "checkpoint.drape", "--format", ALL, "--checkpoint-every", "1")
 
 
 def test_kills():
@@ -135,12 +135,8 @@ def test_two_releases():
     equal(len(nodes), 2)
     for frame in range(31):
         equal(pinned_nodes(f"whole/frame_{frame:06}.vtp"), nodes[:(frame / 50 <= first) + (frame / 50 <= second)], f"frame {frame}")
-    for _ in range(20):  # this process may be late
-        equal(signalled(signal.SIGINT, f"out/frame_{int(50 * first) + 1:06}.vtp", "--format", ALL, "--checkpoint-every", "1"), 130)
-        if first < read_json("out/summary.json")["time"] < second:
-            break
-    else:
-        raise AssertionError("no run was interrupted between the events")
+    equal(signalled(signal.SIGINT, f"frame_{int(50 * first) + 1:06}.vtp", "--format", ALL, "--checkpoint-every", "1"), 130)
+    assert first < read_json("out/summary.json")["time"] < second, "it was not interrupted between the events"
     good("run", "scene.json", "--out", "out", "--format", ALL, "--resume")
     same("whole", "out")
 
@@ -180,7 +176,7 @@ def test_refused():
     """a checkpoint of another scene, damaged, or beside other files: exit 2, one line, and nothing is touched"""
     write_scene(duration=1, integrator={"dt": 0.0005})
     equal(stopped(signal.SIGKILL), -signal.SIGKILL)
-    shutil.copytree("out", "kept")
+    shutil.copytree("out", "kept", ignore=shutil.ignore_patterns("*.part"))  # which have the inode of the folder in their names
     run = ["run", "scene.json", "--out", "out", "--resume"]
 
     def broken(says, *args, formats=ALL, change=lambda: None):

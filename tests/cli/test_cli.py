@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 
-from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, without_warnings, write_scene
+from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, wait_for, without_warnings, write_scene
 
 
 
@@ -486,11 +486,7 @@ def interrupt(signals, *args):
     """Signals a run when its step log has begun to fill. Returns the exit code and stderr."""
     with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        end = time.monotonic() + LIMIT
-        while time.monotonic() < end and process.poll() is None:
-            if os.path.exists("out/steps.csv") and len(read_steps("out")) >= 3:
-                break
-            time.sleep(0.01)
+        wait_for(lambda: os.path.exists("out/steps.csv") and len(read_steps("out")) >= 3, process)
         for one in signals:
             process.send_signal(one)
         out, err = process.communicate(timeout=LIMIT)

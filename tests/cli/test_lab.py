@@ -10,12 +10,11 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 
 import json
 
 from figure import Figure
-from program import PROGRAM, SOURCES, claim, drape, equal, good, read_json, refused, run_tests, scene, write_scene
+from program import PROGRAM, SOURCES, calls_of, claim, drape, equal, good, meddled, read_json, refused, run_tests, scene, wait_for, write_scene
 
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
@@ -439,10 +438,7 @@ def test_validate_goes_on():
     good("validate", "--scenes", "scenes")
     cases = len(os.listdir("scenes")) - 1  # but for the manifest
     with subprocess.Popen([PROGRAM, "validate", "--out", "v"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
-        for _ in range(6000):
-            time.sleep(0.02)
-            if os.path.exists("v/cases.jsonl") and lines_there("v"):
-                break
+        wait_for(lambda: os.path.exists("v/cases.jsonl") and lines_there("v"), child)
         child.send_signal(signal.SIGINT)
         table, message = (text.decode() for text in child.communicate())
     equal(child.returncode, 130, "exit code")
@@ -465,24 +461,15 @@ def test_reference_goes_on():
     """the reference of tradeoff is saved level by level: a run that was killed does not repeat them"""
     write_scene(duration=0.3)
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
-    with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
-        for _ in range(6000):
-            if os.path.exists("t/reference-ida.json") or child.poll() is not None:
-                break
-            time.sleep(0.001)
-        child.kill()
-    assert os.path.exists("t/reference-ida.json") or os.path.exists("t/reference.json"), os.listdir("t")
-    if not os.path.exists("t/reference.json"):
-        # A saved level is used unchanged: if its error is small enough there are no further levels.
-        about = read_json("t/reference-ida.json")
-        about["error_m"] = 1e-12
-        with open("t/reference-ida.json", "w", encoding="utf-8") as file:
-            json.dump(about, file)
-        claim("t", "reference-ida.json")
-        good(*command)
-        equal(read_json("t/reference.json"), about, "the reference")
-    else:
-        good(*command)
+    equal(meddled(*command, signal=int(signal.SIGKILL), file="reference-ida.json").returncode, -signal.SIGKILL)
+    # A saved level is used unchanged: if its error is small enough there are no further levels.
+    about = read_json("t/reference-ida.json")
+    about["error_m"] = 1e-12
+    with open("t/reference-ida.json", "w", encoding="utf-8") as file:
+        json.dump(about, file)
+    claim("t", "reference-ida.json")
+    good(*command)
+    equal(read_json("t/reference.json"), about, "the reference")
     assert not glob.glob("t/reference-*"), "what is left of the levels"
 
 
@@ -525,21 +512,12 @@ def test_resume():
     write_scene(duration=1)
     command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-2:12log", "--axis",
                "/cloth/0/material/young_modulus=1e4:1e6:12log", "--integrators", "be", "--jobs", "1"]
-    good(*command, "--out", "whole")
-    for end in (signal.SIGKILL, signal.SIGINT):
-        with subprocess.Popen([PROGRAM, *command, "--out", "part"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as child:
-            before = len(lines("part"))
-            for _ in range(600):
-                time.sleep(0.05)
-                if os.path.exists("part/cases.jsonl") and child.poll() is None and len(lines_there("part")) > before + 3:
-                    break
-            child.send_signal(end)
-            message = child.stderr.read().decode()
-            child.wait()
-        if end == signal.SIGINT and child.returncode != 0:
-            equal((child.returncode, message), (130, f"drape {command[0]}: interrupted\n"), "Ctrl-C")
-    there = len(lines_there("part"))
-    assert 0 < there, "nothing was kept"
+    count, there = calls_of(*command, "--out", "whole"), 0
+    for end, code, says in (signal.SIGKILL, -signal.SIGKILL, ""), (signal.SIGINT, 130, f"drape {command[0]}: interrupted\n"):
+        result = meddled(*command, "--out", "part", signal=int(end), call=count // 3)
+        equal((result.returncode, result.stderr), (code, says))
+        assert len(lines_there("part")) > there + 3, "cases that were kept"
+        there = len(lines_there("part"))
     good(*command, "--out", "part")
     equal(lines("part"), lines("whole"), "results")
 

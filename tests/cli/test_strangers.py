@@ -5,12 +5,11 @@ import json
 import os
 import re
 import shutil
-import subprocess
+import signal
 import sys
-import time
 
 from figure import Figure
-from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
+from program import LIMIT, SOURCES, calls_of, drape, equal, good, read_json, refused, run_tests, scene, stopped, write_scene
 
 NAMES = {
     "newline": 'a\nsystem("touch RAN_CODE")\nb',
@@ -247,16 +246,13 @@ def test_changed_mesh():
         refused(*repeated, says="holds another experiment")
     mesh(3)
     good(*command, "--out", "again")
-    for _ in range(20):  # while it runs; once more if it was complete before this process could change the mesh
-        mesh(3)
-        shutil.rmtree("running", ignore_errors=True)
-        with subprocess.Popen([PROGRAM, *command[:3], "/integrator/dt=1e-4:1e-2:400log", *command[4:], "--out", "running"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-            while process.poll() is None and not (os.path.exists("running/cases.jsonl") and os.path.getsize("running/cases.jsonl")):
-                time.sleep(0.002)
-            mesh(9)
-            said = process.communicate(timeout=LIMIT)[1]
-        if process.returncode:
-            break
+    running = *command[:3], "/integrator/dt=1e-4:1e-2:20log", *command[4:], "--jobs", "1", "--out", "running"
+    count = calls_of(*running)
+    shutil.rmtree("running")
+    with stopped(*running, call=count // 2) as process:  # while it runs
+        mesh(9)
+        process.send_signal(signal.SIGCONT)
+        said = process.communicate(timeout=LIMIT)[1]
     equal(process.returncode, 1, said)
     assert "was changed while the experiment runs" in said, said
     with open("running/cases.jsonl", encoding="utf-8") as file:

@@ -185,7 +185,7 @@ def test_killed():
     """a killed run leaves readable files with all frames so far"""
     with open("scene.json", "w", encoding="utf-8") as file:
         json.dump(SCENE, file)
-    equal(signalled(signal.SIGKILL, "out/frame_000012.vtp", "--format", FORMATS, "--duration", "200"), -signal.SIGKILL)
+    equal(signalled(signal.SIGKILL, "frame_000012.vtp", "--format", FORMATS, "--duration", "2"), -signal.SIGKILL)
     done = 0
     for check in (lambda: read_numpy("out", "y", "killed"), lambda: read_vtk("out", "y", "killed"), lambda: validate_gltf("out")):
         try:
