@@ -1,15 +1,16 @@
-/* preload.c: preloaded into the program, makes one of its calls go wrong at a moment that is counted, not timed.
+/* preload.c: preloaded into the program, makes one of its calls go wrong at a moment that is counted, not
+ * timed.
  *
  *   DRAPE_FAIL=N    the Nth allocation from main on fails
  *   DRAPE_SIGNAL=S  the process receives the signal S
- *   DRAPE_CALL=N      at its Nth counted call: allocations, readings of the clock, new names of files, from the
- *                     moment on at which it catches signals
+ *   DRAPE_CALL=N      at its Nth counted call: allocations, readings of the clock, new names of files, from
+ *                     the moment on at which it catches signals
  *   DRAPE_FILE=NAME   or when a file of that name first is in its place
  *   DRAPE_AGAIN=S   it receives the signal S as soon as it has handled the first one
  *   DRAPE_COUNT=F   the number of allocations and that of counted calls are written to the file F at the end
  *
- * Processes that the program starts are left alone. A build with sanitizers, which have an allocator of their own,
- * cannot fail an allocation.
+ * Processes that the program starts are left alone. A build with sanitizers, which have an allocator of their
+ * own, cannot fail an allocation.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -140,7 +141,8 @@ int renameat(int from, const char *old, int to, const char *new)
     return result;
 }
 
-/* The program installs its handler of SIGHUP last; the handler, when it has noted the signal, that of the system. */
+/* The program installs its handler of SIGHUP last. That handler notes a signal, and last of all installs the
+ * system's handler of SIGHUP. */
 int sigaction(int one, const struct sigaction *action, struct sigaction *before)
 {
     int (*real)(int, const struct sigaction *, struct sigaction *) = NULL;
