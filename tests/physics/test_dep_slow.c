@@ -1,7 +1,7 @@
 /* test_dep_slow.c: the larger sheets on which the DEP report's program failed (see test_dep.c); takes
  * minutes. */
 #include "support/dep.h"
-#include "support/optional.h"
+#include "support/suite.h"
 
 #define CASE(name, ...)                                                                                      \
     START_TEST(name)                                                                                         \
@@ -17,5 +17,4 @@ CASE(side_26, 26, 0.01, 1e5, "report")
 CASE(side_28, 28, 0.01, 1e5, "report")
 CASE(side_30, 30, 0.01, 1e5, "report")
 
-SUITE_IF_SET("DRAPE_SLOW", "minutes of falling sheets", "dep_slow", side_22_consistent, side_23, side_26,
-             side_28, side_30)
+SUITE("dep_slow", side_22_consistent, side_23, side_26, side_28, side_30)
