@@ -182,10 +182,23 @@ def words_are_standard(files):
     return complaints
 
 
+def prose_of(page):
+    """The lines of a page that can be wrapped, and "" for the others: blocks of code, comments, tables, and lines of one word, such as a link."""
+    fenced = False
+    for line in page.split("\n"):
+        fenced ^= line.strip().startswith("```")
+        whole = re.sub(r"`[^`]*`|!?\[[^\]]*\]\(\S*\)", "x", line.strip())
+        yield "" if fenced or line.strip().startswith(("```", "<!--", "|")) or not re.search(r"\w\S* \S", whole) else line
+
+
 def lines_are_short(files):
-    """clang-format breaks code at 110 columns, but not comments and long strings."""
-    return [f"{path}:{number}: {len(line)} columns; at most 110" for path, text in sources(files, "src", "include", "tests", "bench", "examples").items()
-            for number, line in enumerate(text.split("\n"), 1) if len(line) > 110]
+    """Lines have at most 110 columns: clang-format breaks code, but not comments and long strings, and nothing breaks pages.
+
+    CHANGELOG.md has a line for each change.
+    """
+    lines = [(path, text.split("\n")) for path, text in sources(files, "src", "include", "tests", "bench", "examples").items()]
+    lines += [(path, list(prose_of(text))) for path, text in files.items() if path.endswith(".md") and path != "CHANGELOG.md"]
+    return [f"{path}:{number}: {len(line)} columns; at most 110" for path, text in lines for number, line in enumerate(text, 1) if len(line) > 110]
 
 
 def numbers_have_reasons(files):
@@ -255,11 +268,13 @@ BROKEN = {
         {"src/terms/a.c": "#define A 2\n", "bench/results/numbers.md": "| terms | a.c | `A` | `3` | size |\n"},
         {"src/terms/a.c": "#define A 2\n", "bench/results/numbers.md": "| terms | a.c | `A` | `2` |  |\n"},
         {"src/terms/a.c": "", "bench/results/numbers.md": "| terms | a.c | `A` | `2` | size |\n"}],
-    lines_are_short: [{"src/io/a.c": "x" * 111 + "\n"}],
+    lines_are_short: [
+        {"src/io/a.c": "x" * 111 + "\n"}, {"docs/a.md": "word " * 23}, {"README.md": "```sh\n```\n- [a](b) " + "word " * 23},
+        {"bench/results/a.md": "a [link of two words](" + "x" * 50 + ") " + "word " * 10}],
     no_stray_blanks: [{"a.c": "\tx\n"}, {"a.md": "x \n"}, {"tools/a": "x"}],
 }
 SOUND = {
-    **MAP, "CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "docs/a.md": "agizmo is gizmotic\n",
+    **MAP, "CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "docs/a.md": f"agizmo is gizmotic\n| {'x ' * 60} |\n```sh\n{'x ' * 60}\n```\n- ![of two words]({'x' * 99})\n", "CHANGELOG.md": "x" + " x" * 60 + "\n",
     "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
     "src/sim/c.c": "drape_sin_cos(x); log_of(x); a->log(x); b.pow(x); sqrt(x); /* sin(x) */ fmod(x, y);\n",
     "src/sim/meson.build": "sources = ['b.c', 'c.c', 'd.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1); sin(x); say(\"--dt\");\n",
