@@ -31,7 +31,7 @@ BUILD = os.path.dirname(PROGRAM)
 PAGES = ["README.md", "CONTRIBUTING.md"] + sorted("docs/" + os.path.basename(path) for path in glob.glob(SOURCES + "/docs/*.md"))
 WRITE = "--write" in sys.argv
 LANGUAGES = ("sh", "json", "c", "python", "text")
-FENCE = re.compile(r"^(?: *<!-- (?P<kind>[a-z ]+): (?P<said>.*?) -->\n)?(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^ *```$", re.S | re.M)
+FENCE = re.compile(r"^(?: *<!-- (?P<kind>[a-z ]+): (?P<said>[^\n]*?) -->\n)?(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^ *```$", re.S | re.M)
 HEADS = {"scene": ("cloth",), "cloth": ("mesh", "material", "terms", "pins", "velocity")}
 
 # Output of the C programs of a page that shows that they work.

@@ -183,9 +183,10 @@ def words_are_standard(files):
 
 
 def prose_of(page):
-    """The lines of a page that can be wrapped, and "" for the others: blocks of code, comments, tables, and lines of one word, such as a link."""
+    """The lines of a page that can be wrapped, and "" for the others: blocks of code, comments, tables, and lines of one word, such as a link;
+    what the program prints at its end is left out."""
     fenced = False
-    for line in page.split("\n"):
+    for line in page.partition("<!-- drape list --markdown -->")[0].split("\n"):
         fenced ^= line.strip().startswith("```")
         whole = re.sub(r"`[^`]*`|!?\[[^\]]*\]\(\S*\)", "x", line.strip())
         yield "" if fenced or line.strip().startswith(("```", "<!--", "|")) or not re.search(r"\w\S* \S", whole) else line
