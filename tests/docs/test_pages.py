@@ -12,7 +12,7 @@ and statements of one with a context ctx, a model and a sim. `python` runs. `tex
                                     "the program" as WHAT, by the C programs of the page
     <!-- from: FILE -->             the block is an excerpt of this file
 
-With the argument --write a line of a text that is not printed is replaced in its page by the printed one that begins with the same word.
+With the argument --write a line of a text that is not printed is replaced in its page by the printed one that begins most like it.
 """
 import functools
 import glob
@@ -170,9 +170,8 @@ def check_lines(block, output):
     lines = block.text.splitlines()
     other = [line for line in lines if line not in printed and not line.startswith("...")]
     if WRITE and other:
-        alike = {line: [new for new in printed if new.split(" ")[0] == line.split(" ")[0]] for line in other}
-        assert all(len(new) == 1 for new in alike.values()), f"{block.place}: not one printed line for each: {alike}"
-        text = "".join(alike.get(line, [line])[0] + "\n" for line in lines)
+        alike = {line: max(printed, key=lambda new: len(os.path.commonprefix([line, new]))) for line in other}  # pylint: disable=cell-var-from-loop
+        text = "".join(alike.get(line, line) + "\n" for line in lines)
         with open(os.path.join(SOURCES, block.page), "r+", encoding="utf-8") as file:
             page = file.read().replace(f"```text\n{block.text}```", f"```text\n{text}```")
             file.seek(0), file.truncate(), file.write(page)
