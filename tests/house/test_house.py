@@ -202,6 +202,17 @@ def lines_are_short(files):
     return [f"{path}:{number}: {len(line)} columns; at most 110" for path, text in lines for number, line in enumerate(text, 1) if len(line) > 110]
 
 
+MEASURED = re.compile(r"\b(?:took|takes?|taking) (?:about |some |up to |at most )?[\d.]+ ?(?:us|ms|s|min|minutes|hours)\b(?! of the)|\bp(?:50|9[59]) [\d.]+"
+                      r"|(?<![\w.-])[\d.]+ (?:times|of) the (?:CPU|time)\b|[\d.]+ (?:s|ms) of CPU|\bin [\d ]+ of [\d ]+ (?:runs|scenes)\b"
+                      r"|[\d ]+ rejected (?:attempts|steps)\b")
+
+
+def measurements_are_results(files):
+    """README and docs have no measured times and counts: these are in bench/results with their date, or in what tools write and tests check."""
+    return [f"{path}:{number}: {found.group()}: measurements belong into bench/results" for path, text in files.items()
+            if re.match(r"README\.md$|docs/\w+\.md$", path) for number, line in enumerate(prose_of(text), 1) for found in MEASURED.finditer(line)]
+
+
 def numbers_have_reasons(files):
     """Each fixed number with a name, other than 0 and 1, in the folders NUMBERED has a row with its value in bench/results/numbers.md, and each row
     has a number."""
@@ -272,6 +283,8 @@ BROKEN = {
     lines_are_short: [
         {"src/io/a.c": "x" * 111 + "\n"}, {"docs/a.md": "word " * 23}, {"README.md": "```sh\n```\n- [a](b) " + "word " * 23},
         {"bench/results/a.md": "a [link of two words](" + "x" * 50 + ") " + "word " * 10}],
+    measurements_are_results: [
+        {"docs/a.md": "The run took 12 ms on it.\n"}, {"README.md": "p99 8 ms\n"}, {"docs/a.md": "a fifth, 0.2 of the time, in 3 of 72 scenes\n"}],
     no_stray_blanks: [{"a.c": "\tx\n"}, {"a.md": "x \n"}, {"tools/a": "x"}],
 }
 SOUND = {
