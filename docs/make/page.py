@@ -26,6 +26,7 @@ def anchor(path, heading):
 
 
 def link(page, text, target):
+    text = " ".join(text.split())  # doxygen does not end a list after a reference of two lines
     if re.match(r"https?:", target):
         return f"[{text}]({target})"
     path, _, heading = target.partition("#")
