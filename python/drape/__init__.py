@@ -7,7 +7,7 @@
     sim.advance(1.0)
     print(sim.energy.kinetic, sim.positions.mean(axis=0))
 
-Units are SI, axes are right-handed with y up. docs/python.md shows how things are used together; docs/scene.md has every key of a scene."""
+Units are SI, axes are right-handed with y up. docs/python.md shows how things are used together; docs/reference.md has every key of a scene."""
 from . import plot
 from ._binding import (Attempt, CheckResult, ClothRange, ColliderMotion, Diagnostic, Energy, EventKind, EventRecord, Realtime, Relaxed, SeamReport,
                        Statistics, Status, Untangling, Warning)

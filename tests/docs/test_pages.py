@@ -376,8 +376,8 @@ def test_pages_are_found():
 
 
 def test_scene_page():
-    """docs/scene.md has the tables of this build, which may have fewer entries"""
-    found = read("docs/scene.md").splitlines()
+    """docs/reference.md has the tables of this build, which may have fewer entries"""
+    found = read("docs/reference.md").splitlines()
     missing = [line for line in good("list", "--markdown").splitlines() if line not in found]
     assert not missing, missing
 
