@@ -1,13 +1,13 @@
 /* active.c: see active.h. */
 #include "contact/active.h"
 
+#include "base/list.h"
 #include "contact/barrier.h"
-#include "contact/list.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define SLOTS 4 /* of the hash table, for each contact in `room` */
+#define SLOTS 4 /* of the hash table, for each contact that the list has memory for */
 
 /* Removes the nodes that have no weight. */
 static void reduce(drape_active_contact *contact)
@@ -77,47 +77,34 @@ static int32_t *slot_of(const drape_active_set *set, const drape_active_contact 
     uint64_t hash = 0;
     for (int a = 0; a < 3; a++)
         hash = (hash ^ (uint32_t)key[a]) * 0x9e3779b97f4a7c15u;
-    uint64_t size = SLOTS * (uint64_t)set->room, at = (hash >> 20) % size;
+    uint64_t size = (uint64_t)set->slot_count, at = (hash >> 20) % size;
     while (set->slots[at] > 0 && !is_same(contact, &set->contacts[set->slots[at] - 1]))
         at = at + 1 < size ? at + 1 : 0;
     return &set->slots[at];
 }
 
-/* Makes room for one more contact, in the hash table, too. */
-static bool grow(drape_active_set *set)
-{
-    int32_t room = set->room;
-    drape_active_contact *contacts =
-        drape_list_grow(set->arena, set->contacts, set->count, &room, sizeof *contacts);
-    if (!contacts)
-        return false;
-    set->contacts = contacts;
-    if (room == set->room)
-        return true;
-    int32_t *slots = drape_arena_take(set->arena, SLOTS * (size_t)room, sizeof *slots);
-    if (!slots)
-        return false;
-    drape_arena_release(set->arena, set->slots);
-    set->slots = slots;
-    set->room = room;
-    for (int32_t i = 0; i < set->count; i++)
-        if (is_shared(&set->contacts[i]))
-            *slot_of(set, &set->contacts[i]) = i + 1;
-    return true;
-}
-
 drape_status drape_active_set_add(drape_active_set *set, const drape_active_contact *contact)
 {
-    if (!grow(set))
-        return DRAPE_E_MEMORY;
-    int32_t *slot = is_shared(contact) ? slot_of(set, contact) : NULL;
+    int32_t *slot = is_shared(contact) && set->slot_count > 0 ? slot_of(set, contact) : NULL;
     if (slot && *slot > 0) {
         set->contacts[*slot - 1].pair.area += contact->pair.area;
         return DRAPE_OK;
     }
+    if (!drape_list_append(set->arena, &set->contacts, &set->count, &set->capacity, contact, sizeof *contact))
+        return DRAPE_E_MEMORY;
     if (slot)
-        *slot = set->count + 1;
-    set->contacts[set->count++] = *contact;
+        *slot = set->count;
+    if (set->slot_count == SLOTS * set->capacity)
+        return DRAPE_OK;
+    int32_t *slots = drape_arena_take(set->arena, SLOTS * (size_t)set->capacity, sizeof *slots);
+    if (!slots)
+        return DRAPE_E_MEMORY;
+    drape_arena_release(set->arena, set->slots);
+    set->slots = slots;
+    set->slot_count = SLOTS * set->capacity;
+    for (int32_t i = 0; i < set->count; i++)
+        if (is_shared(&set->contacts[i]))
+            *slot_of(set, &set->contacts[i]) = i + 1;
     return DRAPE_OK;
 }
 
@@ -150,7 +137,7 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
     const drape_pair *pair;
     set->count = set->near_count = 0;
     if (set->slots)
-        memset(set->slots, 0, SLOTS * (size_t)set->room * sizeof *set->slots);
+        memset(set->slots, 0, (size_t)set->slot_count * sizeof *set->slots);
     while ((pair = drape_candidates_next(candidates, away, &cursor))) {
         drape_active_contact contact;
         if (!drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
@@ -163,12 +150,10 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
             contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
                              has_pair(inside, pair);
-            drape_near_pair *near =
-                drape_list_grow(set->arena, set->near, set->near_count, &set->near_room, sizeof *near);
-            if (!near)
+            const drape_near_pair near = {.pair = *pair, .gap = contact.gap.value};
+            if (!drape_list_append(set->arena, &set->near, &set->near_count, &set->near_capacity, &near,
+                                   sizeof near))
                 return DRAPE_E_MEMORY;
-            set->near = near;
-            set->near[set->near_count++] = (drape_near_pair){.pair = *pair, .gap = contact.gap.value};
         }
         reduce(&contact);
         if (drape_active_set_add(set, &contact))
@@ -181,13 +166,10 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
 
 drape_status drape_inside_add(drape_inside_pairs *inside, const drape_pair_key *key)
 {
-    drape_pair_key *keys =
-        drape_list_grow(inside->arena, inside->keys, inside->count, &inside->room, sizeof *keys);
-    if (!keys)
-        return DRAPE_E_MEMORY;
-    inside->keys = keys;
-    inside->keys[inside->count++] = *key;
-    return DRAPE_OK;
+    return drape_list_append(inside->arena, &inside->keys, &inside->count, &inside->capacity, key,
+                             sizeof *key)
+               ? DRAPE_OK
+               : DRAPE_E_MEMORY;
 }
 
 void drape_inside_sort(drape_inside_pairs *inside)

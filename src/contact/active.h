@@ -26,8 +26,8 @@ typedef struct drape_pair_key {
 
 typedef struct drape_inside_pairs {
     drape_arena *arena;
-    drape_pair_key *keys; /* (count of room), ascending */
-    int32_t count, room;
+    drape_pair_key *keys; /* (count of capacity), ascending */
+    int32_t count, capacity;
 } drape_inside_pairs;
 
 /* Keeps those of its pairs that are among the near ones, for at the others both barriers agree, and adds
@@ -51,11 +51,12 @@ typedef struct drape_active_contact {
 
 typedef struct drape_active_set {
     drape_arena *arena;
-    drape_active_contact *contacts; /* (count of room) */
-    int32_t count, room;
-    int32_t *slots; /* (several x room) hash table with the nodes as keys: 1 + index of a contact; 0: free */
-    drape_near_pair *near; /* (near_count of near_room) pairs, not merged */
-    int32_t near_count, near_room;
+    drape_active_contact *contacts; /* (count of capacity) */
+    int32_t count, capacity;
+    int32_t *slots; /* (slot_count) hash table with the nodes as keys: 1 + index of a contact; 0: free */
+    int32_t slot_count;
+    drape_near_pair *near; /* (near_count of near_capacity) pairs, not merged */
+    int32_t near_count, near_capacity;
 } drape_active_set;
 
 /* Lists the active contacts of a configuration at these distances from the paths of the candidates. Those of

@@ -2,8 +2,8 @@
 #include "contact/candidates.h"
 
 #include "base/lanes.h"
+#include "base/list.h"
 #include "base/vec3.h"
-#include "contact/list.h"
 
 #include <string.h>
 
@@ -173,12 +173,8 @@ static void add(void *user, const drape_pair *pair)
 {
     const collector *to = user;
     drape_candidate_set *set = to->set;
-    drape_pair *pairs = drape_list_grow(to->arena, set->pairs, set->count, &set->room, sizeof *pairs);
-    set->known = set->known && pairs;
-    if (!pairs)
-        return;
-    set->pairs = pairs;
-    set->pairs[set->count++] = *pair;
+    if (!drape_list_append(to->arena, &set->pairs, &set->count, &set->capacity, pair, sizeof *pair))
+        set->known = false;
 }
 
 /* ---- Distance from the paths ---- */

@@ -26,8 +26,8 @@ typedef struct drape_candidate_set {
     double *x[2];                 /* (points x 3) the ends of its path */
     drape_collider_pose *pose[2]; /* (collider_count) */
     double *away; /* (points + collider_count) how far from its path each is, on the path measured last [m] */
-    drape_pair *pairs; /* (count of room) including those with surfaces, by increasing rank */
-    int32_t count, room;
+    drape_pair *pairs; /* (count of capacity) including those with surfaces, by increasing rank */
+    int32_t count, capacity;
 } drape_candidate_set;
 
 #define DRAPE_CANDIDATE_SETS 4

@@ -3,29 +3,29 @@
 #include "contact/parts.h"
 
 #include "base/finite.h"
-#include "contact/list.h"
+#include "base/list.h"
 
 #include <math.h>
 #include <string.h>
 
 static void archive_couplings(drape_contact *c, drape_archive *a)
 {
+    static const int32_t unread[4];
     int32_t count = c->coupling_count;
     drape_archive_int32(a, &count);
     if (a->reading)
         c->coupling_count = 0;
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
-        int32_t *list = drape_list_grow(c->arena, c->coupling, i, &c->coupling_room, 4 * sizeof *list);
-        if (!list) {
+        if (a->reading && !drape_list_append(c->arena, &c->coupling, &c->coupling_count,
+                                             &c->coupling_capacity, unread, sizeof unread)) {
             drape_archive_note(a, DRAPE_E_MEMORY);
             return;
         }
-        c->coupling = list;
-        drape_archive_bytes(a, list + 4 * (size_t)i, 4 * sizeof *list);
+        int32_t *nodes = c->coupling + 4 * (size_t)i;
+        drape_archive_bytes(a, nodes, 4 * sizeof *nodes);
         for (size_t k = 0; k < 4 && drape_archive_good(a); k++)
-            if (list[4 * (size_t)i + k] < 0 || list[4 * (size_t)i + k] >= c->model->node_count)
+            if (nodes[k] < 0 || nodes[k] >= c->model->node_count)
                 drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint couples a node that is not there");
-        c->coupling_count = i + 1;
     }
 }
 

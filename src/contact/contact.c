@@ -19,8 +19,8 @@
 
 #include "base/clock.h"
 #include "base/elementary.h"
+#include "base/list.h"
 #include "base/vec3.h"
-#include "contact/list.h"
 #include "geometry/mesh_distance.h"
 
 #include <float.h>
@@ -322,8 +322,8 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     if (!status && c->exempt)
         status = c->exempt->add(c, at);
     if (!status)
-        status = drape_predictions_reserve(&c->predicted, c->active.room);
-    return status ? status : drape_predictions_reserve(&c->predicting, c->active.room);
+        status = drape_predictions_reserve(&c->predicted, c->active.capacity);
+    return status ? status : drape_predictions_reserve(&c->predicting, c->active.capacity);
 }
 
 drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at)
@@ -378,15 +378,12 @@ drape_status drape_contact_lag(drape_contact *c)
         const drape_contact_law law = drape_contact_law_of(c, contact);
         if (!(law.friction > 0))
             continue;
-        drape_lagged *lagged =
-            drape_list_grow(c->arena, c->lagged, c->lagged_count, &c->lagged_room, sizeof *lagged);
-        if (!lagged)
-            return DRAPE_E_MEMORY;
-        c->lagged = lagged;
         drape_contact_velocities(c, contact, v);
         const drape_normal normal = drape_normal_at(&contact->gap, &law, v);
-        c->lagged[c->lagged_count++] =
-            (drape_lagged){.contact = *contact, .force = drape_normal_force(&normal)};
+        const drape_lagged lagged = {.contact = *contact, .force = drape_normal_force(&normal)};
+        if (!drape_list_append(c->arena, &c->lagged, &c->lagged_count, &c->lagged_capacity, &lagged,
+                               sizeof lagged))
+            return DRAPE_E_MEMORY;
     }
     return DRAPE_OK;
 }

@@ -69,8 +69,8 @@ void drape_contact_add_forces(drape_contact *contact, bool conservative, bool di
 /* The forces of the last drape_contact_add_forces on each collider (collider_count), with the sign of g. */
 const drape_load *drape_contact_on_colliders(const drape_contact *contact);
 
-/* Lists up to `room` of the contacts at the last point, with their forces there; returns their number. */
-int32_t drape_contact_points(const drape_contact *contact, int32_t room, drape_contact_point *points);
+/* Lists up to `capacity` of the contacts at the last point, with their forces there; returns their number. */
+int32_t drape_contact_points(const drape_contact *contact, int32_t capacity, drape_contact_point *points);
 
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 

@@ -3,9 +3,9 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/list.h"
 #include "base/vec3.h"
 #include "contact/barrier.h"
-#include "contact/list.h"
 
 #include <string.h>
 
@@ -375,15 +375,11 @@ bool drape_contact_is_in_pattern(const drape_contact *c, const drape_pattern *pa
 /* Lists the nodes of a pair; if it has fewer than four, the first one is repeated. */
 static bool add_coupling(drape_contact *c, const drape_pair *pair, int points)
 {
-    int32_t *coupling =
-        drape_list_grow(c->arena, c->coupling, c->coupling_count, &c->coupling_room, 4 * sizeof *coupling);
-    if (!coupling)
-        return false;
-    c->coupling = coupling;
+    int32_t nodes[4];
     for (int a = 0; a < 4; a++)
-        c->coupling[4 * (size_t)c->coupling_count + (size_t)a] = pair->node[a < points ? a : 0];
-    c->coupling_count++;
-    return true;
+        nodes[a] = pair->node[a < points ? a : 0];
+    return drape_list_append(c->arena, &c->coupling, &c->coupling_count, &c->coupling_capacity, nodes,
+                             sizeof nodes);
 }
 
 /* The pairs of cloth that are listed, and whether there was memory for all. */

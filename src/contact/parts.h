@@ -70,8 +70,8 @@ struct drape_contact {
     drape_exempt *exempt; /* NULL: all pairs are held. Set from outside, where it is archived */
     bool refused;         /* the last check failed for a pair, since the step began: */
     drape_pair refusing;
-    drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
-    int32_t lagged_count, lagged_room;
+    drape_lagged *lagged; /* (lagged_count of lagged_capacity) lagged friction */
+    int32_t lagged_count, lagged_capacity;
 
     drape_predictions predicted, predicting; /* for the next Jacobian, and while they are made; not archived:
                                                 empty when a step begins */
@@ -81,8 +81,8 @@ struct drape_contact {
     bool *moved, *carried;          /* (points + collider_count), (node_count) scratch of sweep.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     drape_collider_pose *kink_pose; /* (collider_count) */
-    int32_t *coupling;              /* (coupling_count of coupling_room x 4) */
-    int32_t coupling_count, coupling_room;
+    int32_t *coupling;              /* (coupling_count of coupling_capacity x 4) */
+    int32_t coupling_count, coupling_capacity;
     double *own, *own_end; /* (largest point_count x 3) points of a collider that deforms, and elsewhere */
     double *on_point;      /* (points - node_count, x 3) [N] forces on points of colliders that deform */
     drape_deformed **deformed;   /* (collider_count) those that deform, else NULL */

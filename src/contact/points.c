@@ -74,11 +74,11 @@ static drape_contact_point lagged_point(const drape_contact *c, const drape_lagg
     return out;
 }
 
-int32_t drape_contact_points(const drape_contact *c, int32_t room, drape_contact_point *points)
+int32_t drape_contact_points(const drape_contact *c, int32_t capacity, drape_contact_point *points)
 {
-    for (int32_t i = 0; i < c->active.count && i < room; i++)
+    for (int32_t i = 0; i < c->active.count && i < capacity; i++)
         points[i] = point_of(c, &c->active.contacts[i]);
-    for (int32_t i = 0; i < c->lagged_count && c->active.count + i < room; i++)
+    for (int32_t i = 0; i < c->lagged_count && c->active.count + i < capacity; i++)
         points[c->active.count + i] = lagged_point(c, &c->lagged[i]);
     return c->active.count + c->lagged_count;
 }

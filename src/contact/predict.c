@@ -26,21 +26,21 @@ void drape_predictions_clear(drape_predictions *p)
     p->count = 0;
 }
 
-drape_status drape_predictions_reserve(drape_predictions *p, int32_t room)
+drape_status drape_predictions_reserve(drape_predictions *p, int32_t capacity)
 {
-    if (room <= p->room)
+    if (capacity <= p->capacity)
         return DRAPE_OK;
-    drape_predicted *list = drape_arena_resize(p->arena, p->list, (size_t)room, sizeof *list);
+    drape_predicted *list = drape_arena_resize(p->arena, p->list, (size_t)capacity, sizeof *list);
     if (!list)
         return DRAPE_E_MEMORY;
     p->list = list;
-    p->room = room;
+    p->capacity = capacity;
     return DRAPE_OK;
 }
 
 bool drape_predictions_add(drape_predictions *p, const drape_active_contact *contact, double force)
 {
-    if (p->count == p->room)
+    if (p->count == p->capacity)
         return false;
     drape_predicted *to = &p->list[p->count];
     memcpy(to->node, contact->pair.node, sizeof to->node);

@@ -30,19 +30,19 @@ typedef struct drape_predicted {
 
 typedef struct drape_predictions {
     drape_arena *arena;
-    drape_predicted *list; /* (count of room) */
+    drape_predicted *list; /* (count of capacity) */
     int32_t *first;        /* (points) index of the first with this first point; -1: none */
-    int32_t count, room;
+    int32_t count, capacity;
 } drape_predictions;
 
 /* Makes an empty list for so many points. Errors: DRAPE_E_MEMORY. */
 drape_status drape_predictions_init(drape_arena *arena, int32_t points, drape_predictions *predictions);
 void drape_predictions_clear(drape_predictions *predictions);
 
-/* Takes room for so many, so that the list grows only where the active set does. Errors: DRAPE_E_MEMORY. */
-drape_status drape_predictions_reserve(drape_predictions *predictions, int32_t room);
+/* Takes memory for so many, so that the list grows only where the active set does. Errors: DRAPE_E_MEMORY. */
+drape_status drape_predictions_reserve(drape_predictions *predictions, int32_t capacity);
 
-/* False: there is no room. */
+/* False: the list is full. */
 bool drape_predictions_add(drape_predictions *predictions, const drape_active_contact *contact, double force);
 
 /* The secant stiffness [N/m] by drape_predicted_stiffness at the force that is predicted for a contact; NAN:

@@ -11,9 +11,9 @@ static bool are_sorted(const drape_pair *pairs, int32_t count)
     return true;
 }
 
-static int32_t room_for(int32_t count, int32_t room)
+static int32_t capacity_for(int32_t count, int32_t capacity)
 {
-    return count <= room ? room : count <= INT32_MAX / 2 ? 2 * count : count;
+    return count <= capacity ? capacity : count <= INT32_MAX / 2 ? 2 * count : count;
 }
 
 /* The smallest and the largest of one of the ranks. */
@@ -38,23 +38,24 @@ static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32
         const span of = span_of(pairs, count, k);
         widest = of.high - of.low > widest ? of.high - of.low : widest;
     }
-    const int32_t room = room_for(count, s->room), first_room = room_for(widest + 2, s->first_room);
-    if (room > s->room) {
-        drape_pair *to = drape_arena_resize(s->arena, s->pairs, (size_t)room, sizeof *to);
+    const int32_t capacity = capacity_for(count, s->capacity),
+                  first_capacity = capacity_for(widest + 2, s->first_capacity);
+    if (capacity > s->capacity) {
+        drape_pair *to = drape_arena_resize(s->arena, s->pairs, (size_t)capacity, sizeof *to);
         s->pairs = to ? to : s->pairs;
         for (int k = 0; k < 2 && to; k++) {
-            int32_t *order = drape_arena_resize(s->arena, s->order[k], (size_t)room, sizeof *order);
+            int32_t *order = drape_arena_resize(s->arena, s->order[k], (size_t)capacity, sizeof *order);
             s->order[k] = order ? order : s->order[k];
             to = order ? to : NULL;
         }
-        s->room = to ? room : s->room;
+        s->capacity = to ? capacity : s->capacity;
     }
-    if (first_room > s->first_room) {
-        int32_t *first = drape_arena_resize(s->arena, s->first, (size_t)first_room, sizeof *first);
+    if (first_capacity > s->first_capacity) {
+        int32_t *first = drape_arena_resize(s->arena, s->first, (size_t)first_capacity, sizeof *first);
         s->first = first ? first : s->first;
-        s->first_room = first ? first_room : s->first_room;
+        s->first_capacity = first ? first_capacity : s->first_capacity;
     }
-    return room > s->room || first_room > s->first_room ? DRAPE_E_MEMORY : DRAPE_OK;
+    return capacity > s->capacity || first_capacity > s->first_capacity ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
 /* Writes the numbers of the pairs by one of their ranks, those with the same one as they were; from NULL:

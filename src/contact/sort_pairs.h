@@ -19,10 +19,10 @@ static inline bool drape_pair_is_before(const drape_pair *a, const drape_pair *b
 /* Scratch, which grows in the arena. Set the arena, zero the rest. */
 typedef struct drape_pair_sorter {
     drape_arena *arena;
-    drape_pair *pairs; /* (room) */
-    int32_t *order[2]; /* (room) */
-    int32_t *first;    /* (first_room) of the pairs with each rank */
-    int32_t room, first_room;
+    drape_pair *pairs; /* (capacity) */
+    int32_t *order[2]; /* (capacity) */
+    int32_t *first;    /* (first_capacity) of the pairs with each rank */
+    int32_t capacity, first_capacity;
 } drape_pair_sorter;
 
 /* Sorts `count` pairs. Errors: DRAPE_E_MEMORY, the pairs stay as they are. */

@@ -207,11 +207,11 @@ static inline int32_t pair_with(const drape_neighbours *s, int32_t at, uint64_t 
     return count;
 }
 
-/* Collects all pairs of points nearer than reach, which is the size of the boxes. Returns -1 if there is no
- * room for all. */
+/* Collects all pairs of points nearer than reach, which is the size of the boxes. Returns -1 if there are
+ * more than the lists hold. */
 static int32_t collect_pairs(drape_neighbours *s, double reach)
 {
-    const int32_t room = s->points * (DRAPE_MEAN_NEIGHBOURS / 2);
+    const int32_t capacity = s->points * (DRAPE_MEAN_NEIGHBOURS / 2);
     int32_t count = 0;
     surroundings a = {.bucket = -1};
     for (int32_t at = 0; at < s->points; at++) {
@@ -231,7 +231,7 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
         int32_t last = s->start[bucket + 1], candidates = last - at;
         for (int k = 0; k < a.count; k++)
             candidates += a.range[k].last - a.range[k].first;
-        if (candidates > room - count) /* each is written, and counted only if it is near */
+        if (candidates > capacity - count) /* each is written, and counted only if it is near */
             return -1;
         count = pair_with(s, at, a.row, at + 1, last, reach * reach, count);
         for (int k = 0; k < a.count; k++)

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #define DRAPE_MAX_NEIGHBOURS  64 /* maximum length of the list of a point */
-#define DRAPE_MEAN_NEIGHBOURS 24 /* room in the lists, per point on average */
+#define DRAPE_MEAN_NEIGHBOURS 24 /* capacity of the lists, per point on average */
 
 typedef struct drape_neighbours {
     int32_t points;
@@ -50,13 +50,13 @@ int drape_neighbours_search(const drape_neighbours *neighbours, int32_t point, c
                             int32_t found[DRAPE_MAX_NEIGHBOURS + 1]);
 
 /* Finds the numbers, in ascending order, of all points nearer to a point at x than the reach, and of some
- * others. *near points to an array of the neighbours, valid until the next update, or to `room`. Returns
+ * others. *near points to an array of the neighbours, valid until the next update, or to `scratch`. Returns
  * their count, or -1 if there are more than DRAPE_MAX_NEIGHBOURS. */
 static inline int drape_neighbours_of(const drape_neighbours *s, int32_t point, const double *x,
-                                      int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
+                                      int32_t scratch[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
 {
-    *near = s->listed ? s->near + s->first[point] : room;
-    return s->listed ? s->first[point + 1] - s->first[point] : drape_neighbours_search(s, point, x, room);
+    *near = s->listed ? s->near + s->first[point] : scratch;
+    return s->listed ? s->first[point + 1] - s->first[point] : drape_neighbours_search(s, point, x, scratch);
 }
 
 #endif

@@ -279,7 +279,7 @@ typedef struct drape_contact_def {
     double relaxed_pressure;     /* with which relaxed cloth is pushed out of them [Pa] */
 } drape_contact_def;
 
-/* Whether the start of a run is untangled, and how (contact/untangle.h). */
+/* Whether the start of a run is untangled, and how (untangle/untangler.h). */
 #define DRAPE_UNTANGLE_DEFAULT_SWEEPS 400
 #define DRAPE_UNTANGLE_DEFAULT_GAP    1.0
 typedef struct drape_model_untangle {

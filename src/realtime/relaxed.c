@@ -2,8 +2,8 @@
 #include "realtime/relaxed.h"
 
 #include "base/elementary.h"
+#include "base/list.h"
 #include "base/vec3.h"
-#include "contact/list.h"
 
 #include <string.h>
 
@@ -166,23 +166,20 @@ drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t
         found->until = fmax(found->until, until);
         return DRAPE_OK;
     }
-    drape_relaxed_node *nodes =
-        drape_list_grow(set->arena, set->nodes, set->exempt.count, &set->room, sizeof *set->nodes);
-    if (!nodes)
+    const int32_t at = place_of(set, collider, node), behind = set->exempt.count - at;
+    const drape_relaxed_node new = {.collider = collider,
+                                    .node = node,
+                                    .since = t,
+                                    .until = until,
+                                    .gap = INFINITY,
+                                    .factor = 1,
+                                    .blocked = true,
+                                    .fresh = true};
+    if (!drape_list_append(set->arena, &set->nodes, &set->exempt.count, &set->capacity, &new, sizeof new))
         return DRAPE_E_MEMORY;
-    set->nodes = nodes;
-    const int32_t at = place_of(set, collider, node);
-    memmove(nodes + at + 1, nodes + at, (size_t)(set->exempt.count - at) * sizeof *nodes);
-    nodes[at] = (drape_relaxed_node){.collider = collider,
-                                     .node = node,
-                                     .since = t,
-                                     .until = until,
-                                     .gap = INFINITY,
-                                     .factor = 1,
-                                     .blocked = true,
-                                     .fresh = true};
+    memmove(set->nodes + at + 1, set->nodes + at, (size_t)behind * sizeof new);
+    set->nodes[at] = new;
     set->of_node[node] = 1;
-    set->exempt.count++;
     (*added)++;
     return DRAPE_OK;
 }

@@ -50,8 +50,8 @@ typedef struct drape_relaxed_set {
     drape_exempt exempt; /* what contact asks; its count is that of the nodes */
     drape_arena *arena;
     const drape_model *model;
-    drape_relaxed_node *nodes; /* (exempt.count of room) by increasing collider and node */
-    int32_t room;
+    drape_relaxed_node *nodes; /* (exempt.count of capacity) by increasing collider and node */
+    int32_t capacity;
     uint8_t *of_node;             /* (node_count) whether it is among them, for any collider */
     double *normal;               /* (node_count x 3) scratch */
     double *reach;                /* (node_count) scratch */

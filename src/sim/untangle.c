@@ -9,9 +9,9 @@
 #include "base/def.h"
 #include "base/vec3.h"
 #include "colliders/deformed.h"
-#include "contact/untangle.h"
 #include "geometry/intersect.h"
 #include "sim/inside.h"
+#include "untangle/untangler.h"
 
 #include <stdio.h>
 #include <string.h>

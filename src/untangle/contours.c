@@ -1,12 +1,12 @@
 /*
- * untangle_contours.c: the curves in which sheets intersect. A curve is a chain of pairs of triangles, linked
+ * contours.c: the curves in which sheets intersect. A curve is a chain of pairs of triangles, linked
  * by the points where an edge of one passes through the other. It has two traces, one on each sheet. If a
  * trace cuts its sheet in two, the smaller part is on the wrong side, of the smaller of both sheets' parts:
  * its nodes next to the curve are to pass through. If no trace does, its length is reduced.
  */
-#include "contact/untangle_parts.h"
+#include "untangle/workspace.h"
 
-#include "contact/list.h"
+#include "base/list.h"
 #include "geometry/intersect.h"
 
 #include <math.h>
@@ -38,23 +38,19 @@ static void note_crossing(void *user, int32_t edge, int32_t triangle)
         drape_model_ignores(u->model, s->of_point[a < nodes ? b : a] - u->model->cloth_count,
                             a < nodes ? a : b))
         return;
-    drape_crossing *list =
-        drape_list_grow(u->arena, u->crossing, u->crossing_count, &u->crossing_room, sizeof *list);
-    u->out_of_memory = u->out_of_memory || !list;
-    if (!list)
-        return;
-    u->crossing = list;
-    drape_crossing *found = &list[u->crossing_count++];
     const double *p = u->x + 3 * (size_t)a, *q = u->x + 3 * (size_t)ends[1], *o = u->x + 3 * (size_t)b;
     double n[3], op[3], oq[3];
     vec3_triangle_area(corner, u->x, n);
     vec3_sub(p, o, op);
     vec3_sub(q, o, oq);
     const double above = fabs(vec3_dot(n, op)), below = fabs(vec3_dot(n, oq));
-    *found = (drape_crossing){.edge = e, .triangle = t, .contour = -1};
-    found->t = above + below > 0 ? above / (above + below) : 0.5;
+    drape_crossing found = {.edge = e, .triangle = t, .contour = -1};
+    found.t = above + below > 0 ? above / (above + below) : 0.5;
     for (int k = 0; k < 3; k++)
-        found->x[k] = (1 - found->t) * p[k] + found->t * q[k];
+        found.x[k] = (1 - found.t) * p[k] + found.t * q[k];
+    if (!drape_list_append(u->arena, &u->crossing, &u->crossing_count, &u->crossing_capacity, &found,
+                           sizeof found))
+        u->out_of_memory = true;
 }
 
 static drape_status find_crossings(drape_untangler *u)
@@ -104,13 +100,11 @@ static drape_status list_records(drape_untangler *u)
                           at = u->sheets.edge_triangle[2 * (size_t)u->crossing[c].edge + (size_t)k];
             if (at < 0)
                 continue;
-            drape_crossing_record *list =
-                drape_list_grow(u->arena, u->record, u->record_count, &u->record_room, sizeof *list);
-            if (!list)
-                return DRAPE_E_MEMORY;
-            u->record = list;
-            list[u->record_count++] = (drape_crossing_record){
+            const drape_crossing_record new = {
                 {at < face ? at : face, at < face ? face : at}, .crossing = c, .edge_in_first = at < face};
+            if (!drape_list_append(u->arena, &u->record, &u->record_count, &u->record_capacity, &new,
+                                   sizeof new))
+                return DRAPE_E_MEMORY;
         }
     if (u->record_count > 0)
         qsort(u->record, (size_t)u->record_count, sizeof *u->record, compare_records);

@@ -1,17 +1,17 @@
 /*
- * untangle_parts.h: what the files of untangle.h share. untangle.c: the sweeps, and the positions that
- * satisfy all bounds with the least distortion; untangle_contours.c: where sheets pass through each other,
- * and which part of them is on the wrong side; untangle_bodies.c: what is inside closed colliders;
- * untangle_gaps.c: pairs that are apart and stay so.
+ * workspace.h: what the files of untangler.h share. bounds.c: half spaces that positions are to be in, and
+ * the positions in them with the least distortion; contours.c: where sheets pass through each other, and
+ * which part of them is on the wrong side; bodies.c: what is inside closed colliders; gaps.c: pairs that are
+ * apart and stay apart; untangler.c: the topology of the sheets, and the sweeps.
  */
-#ifndef DRAPE_CONTACT_UNTANGLE_PARTS_H
-#define DRAPE_CONTACT_UNTANGLE_PARTS_H
+#ifndef DRAPE_UNTANGLE_WORKSPACE_H
+#define DRAPE_UNTANGLE_WORKSPACE_H
 
 #include "base/vec3.h"
 #include "contact/broad_phase.h"
 #include "contact/sort_pairs.h"
-#include "contact/untangle.h"
 #include "geometry/nearest.h"
+#include "untangle/untangler.h"
 
 /* The surfaces that have no inside: the cloths, and open colliders, which do not move. Points are those of
  * the broad phase. */
@@ -29,11 +29,6 @@ typedef struct drape_half_space {
     double c[4], normal[3], bound;
 } drape_half_space;
 
-typedef struct drape_half_spaces {
-    drape_half_space *list; /* (count of room) */
-    int32_t count, room;
-} drape_half_spaces;
-
 /* An edge that passes through a triangle, and the point where it does. */
 typedef struct drape_crossing {
     int32_t edge, triangle;
@@ -49,7 +44,7 @@ typedef struct drape_crossing_record {
     bool edge_in_first; /* the edge is one of triangle[0] */
 } drape_crossing_record;
 
-/* Points of a sheet that pass to the other side of a sheet or a collider: their gaps there do not count. */
+/* A point that is to pass to the other side of a sheet: its gaps from that sheet do not count. */
 typedef struct drape_passage {
     int32_t point, sheet;
 } drape_passage;
@@ -66,8 +61,8 @@ typedef struct drape_untangler {
     const drape_model *model;
     const drape_untangle_limits *def;
     drape_broad_phase broad;
-    drape_pair *near; /* (near_count of near_room) pairs that may be near each other, by rank */
-    int32_t near_count, near_room;
+    drape_pair *close_pairs; /* (pair_count of pair_capacity) that may be near each other, by rank */
+    int32_t pair_count, pair_capacity;
     drape_pair_sorter sorter;
     drape_collider_pose *pose;   /* (collider_count) */
     const drape_collider **body; /* (collider_count) as they are at the time */
@@ -86,13 +81,14 @@ typedef struct drape_untangler {
     double *face_area;      /* (triangles of the model) [m2] in the state that was given */
     double *hinge_length;   /* (hinge_count) [m] in the state that was given */
     int32_t hinge_count;
-    drape_half_spaces bounds; /* of this sweep */
-    drape_crossing *crossing; /* (crossing_count of crossing_room) of this sweep */
-    int32_t crossing_count, crossing_room;
+    drape_half_space *bounds; /* (bound_count of bound_capacity) of this sweep */
+    int32_t bound_count, bound_capacity;
+    drape_crossing *crossing; /* (crossing_count of crossing_capacity) of this sweep */
+    int32_t crossing_count, crossing_capacity;
     drape_crossing_record *record;
-    int32_t record_count, record_room;
-    drape_passage *passage; /* (passage_count of passage_room) sorted */
-    int32_t passage_count, passage_room;
+    int32_t record_count, record_capacity;
+    drape_passage *passage; /* (passage_count of passage_capacity) sorted */
+    int32_t passage_count, passage_capacity;
     bool *passes;    /* (points) it has a passage */
     int8_t *colour;  /* (points) scratch of a curve */
     int32_t *queue;  /* (points) scratch */
@@ -100,7 +96,7 @@ typedef struct drape_untangler {
     bool *sunk;      /* (node_count) in a collider, or a corner of a face that is */
     double *depth;   /* (node_count) signed distance from the body in which it is deepest; 0: in none */
     double *outward; /* (node_count x 3) its gradient, where it is not 0 */
-    int32_t *piece;  /* (node_count) number of the piece of cloth that hangs together */
+    int32_t *piece;  /* (node_count) number of the connected piece of cloth */
     int32_t piece_count;
     drape_untangle_exit *exit; /* (piece_count) */
     int64_t sunk_count;        /* nodes, and faces between them, that are in a collider */
@@ -108,9 +104,6 @@ typedef struct drape_untangler {
     double min_wanted;         /* the smallest gap, in wanted gaps */
     bool out_of_memory;        /* of a list, in a callback */
 } drape_untangler;
-
-/* Adds a bound; notes if memory is out. */
-void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound);
 
 /* The largest displacement [m] of a point in a sweep. */
 #define DRAPE_UNTANGLE_STRIDE 0.5 /* of the mean edge */
@@ -125,16 +118,23 @@ static inline double drape_untangle_wanted(const drape_untangler *u, double dist
     return u->def->gap * distance;
 }
 
-/* Finds all crossings of sheets, and adds the bounds that take them apart, and the passages. */
-drape_status drape_untangle_contours(drape_untangler *u);
-bool drape_untangle_passes(const drape_untangler *u, int32_t point, int32_t sheet);
+/* bounds.c. The first two set out_of_memory where there is none. */
+void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound);
 void drape_untangle_add_passage(drape_untangler *u, int32_t point, int32_t sheet);
-void drape_untangle_sort_passages(drape_untangler *u);
+void drape_untangle_sort_passages(drape_untangler *u); /* after the last one was added */
+bool drape_untangle_passes(const drape_untangler *u, int32_t point, int32_t sheet);
 
-/* Adds bounds for nodes and faces in closed colliders, and counts these. */
+/* Moves x to where bounds, lengths and bends are kept as well as possible. */
+void drape_untangle_project(drape_untangler *u);
+
+/* contours.c: finds all crossings of sheets, and adds the bounds that take them apart, and the passages. */
+drape_status drape_untangle_contours(drape_untangler *u);
+
+/* bodies.c: adds bounds for nodes and faces in closed colliders, and counts these. */
 drape_status drape_untangle_bodies(drape_untangler *u);
 
-/* Adds bounds for pairs that are near each other, except where they pass through, and measures their gaps. */
+/* gaps.c: adds bounds for pairs that are near each other, except where they pass through, and measures their
+ * gaps. */
 drape_status drape_untangle_gaps(drape_untangler *u);
 
 #endif

@@ -1,57 +1,14 @@
 /*
- * untangle_gaps.c: the pairs that are near each other, as contact has them. Each keeps its side, and gets the
- * gap that is wanted, unless one of its pieces is to pass the other one's sheet.
+ * gaps.c: the pairs that are near each other, as contact finds them. Each keeps its side, and gets the gap
+ * that is wanted, unless one of its pieces is to pass the sheet of the other piece.
  */
-#include "contact/untangle_parts.h"
+#include "untangle/workspace.h"
 
-#include "contact/list.h"
+#include "base/list.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #define REACH 1.2 /* strides beyond the wanted gap within which pairs are kept apart */
-
-/* ---- Passages ---- */
-
-static int compare_passages(const void *a, const void *b)
-{
-    const drape_passage *p = a, *q = b;
-    return p->point != q->point ? (p->point > q->point ? 1 : -1)
-                                : (p->sheet > q->sheet) - (p->sheet < q->sheet);
-}
-
-void drape_untangle_add_passage(drape_untangler *u, int32_t point, int32_t sheet)
-{
-    drape_passage *list =
-        drape_list_grow(u->arena, u->passage, u->passage_count, &u->passage_room, sizeof *list);
-    u->out_of_memory = u->out_of_memory || !list;
-    if (!list)
-        return;
-    u->passage = list;
-    u->passage[u->passage_count++] = (drape_passage){point, sheet};
-    u->passes[point] = true;
-}
-
-void drape_untangle_sort_passages(drape_untangler *u)
-{
-    if (u->passage_count > 0)
-        qsort(u->passage, (size_t)u->passage_count, sizeof *u->passage, compare_passages);
-}
-
-bool drape_untangle_passes(const drape_untangler *u, int32_t point, int32_t sheet)
-{
-    const drape_passage key = {point, sheet};
-    return u->passes[point] &&
-           bsearch(&key, u->passage, (size_t)u->passage_count, sizeof key, compare_passages);
-}
-
-/* ---- Pairs ---- */
-
-typedef struct gathering {
-    drape_untangler *u;
-    drape_configuration rest;
-    double reach;
-} gathering;
 
 /* Whether some node of one piece passes the sheet of the other. */
 static bool is_passing(const drape_untangler *u, const drape_pair *pair)
@@ -64,7 +21,8 @@ static bool is_passing(const drape_untangler *u, const drape_pair *pair)
     return false;
 }
 
-/* What is in a closed collider has no side that its features could keep it on. */
+/* Whether a pair is of a closed collider and of cloth inside it, which has no side to be kept on by features
+ * of the collider. */
 static bool is_sunk(const drape_untangler *u, const drape_pair *pair)
 {
     for (int a = 0; pair->collider >= 0 && !u->open[pair->collider] && a < 4; a++)
@@ -88,24 +46,22 @@ static void normal_at(const drape_untangler *u, int32_t node, double n[3])
         }
 }
 
-static void gather(void *user, const drape_pair *pair)
+static void list_pair(void *user, const drape_pair *pair)
 {
     drape_untangler *u = user;
-    drape_pair *near = drape_list_grow(u->arena, u->near, u->near_count, &u->near_room, sizeof *near);
-    u->out_of_memory = u->out_of_memory || !near;
-    if (!near)
-        return;
-    u->near = near;
-    u->near[u->near_count++] = *pair;
+    if (!drape_list_append(u->arena, &u->close_pairs, &u->pair_count, &u->pair_capacity, pair, sizeof *pair))
+        u->out_of_memory = true;
 }
 
-static void consider(const gathering *g, const drape_pair *found)
+/* Measures the gap of a pair, which is near if the gap is less than the reach beyond the wanted one, and adds
+ * its bound. */
+static void keep_gap(drape_untangler *u, const drape_pair *found, double reach)
 {
-    drape_untangler *u = g->u;
+    const drape_configuration rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose};
     drape_pair pair = *found;
     double x[4][3];
     drape_closest closest;
-    pair.distance = drape_pair_activation_distance(found, &g->rest);
+    pair.distance = drape_pair_activation_distance(found, &rest);
     if (is_passing(u, &pair) || is_sunk(u, &pair))
         return;
     for (int a = 0; a < 4; a++)
@@ -116,15 +72,15 @@ static void consider(const gathering *g, const drape_pair *found)
         drape_closest_segments(x, &closest);
     const double gap = closest.distance - pair.radius, wanted = drape_untangle_wanted(u, pair.distance),
                  least = drape_pair_least_gap(&pair, u->broad.rounding);
-    if (gap >= wanted + g->reach)
+    if (gap >= wanted + reach)
         return;
     if (least > 0)
         u->min_share = fmin(u->min_share, gap / least);
     if (wanted > 0)
         u->min_wanted = fmin(u->min_wanted, gap / wanted);
     if (closest.distance < DRAPE_NO_SIDE * u->broad.rounding) {
-        /* Pieces at distance 0, such as layers that begin in one plane: the sheet that comes later goes to
-         * where the normal of the earlier one points. */
+        /* Pieces at distance 0, such as layers that begin in one plane: the sheet with the higher number goes
+         * to the side to which the normal of the other one points. */
         double *n = closest.normal;
         const int split = pair.kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
         const bool first = pair.node[0] < pair.node[3];
@@ -147,15 +103,13 @@ static void consider(const gathering *g, const drape_pair *found)
 
 drape_status drape_untangle_gaps(drape_untangler *u)
 {
-    gathering g = {.u = u,
-                   .rest = {.model = u->model, .x = u->broad.rest, .pose = u->pose},
-                   .reach = REACH * drape_untangle_stride(u)};
-    const drape_broad_query want = {.x = u->x, .pose = {u->pose, u->pose}, .reach = g.reach};
-    u->near_count = 0;
-    drape_broad_phase_pairs(&u->broad, &want, gather, u);
-    if (u->out_of_memory || drape_sort_pairs(&u->sorter, u->near, u->near_count))
+    const double reach = REACH * drape_untangle_stride(u);
+    const drape_broad_query want = {.x = u->x, .pose = {u->pose, u->pose}, .reach = reach};
+    u->pair_count = 0;
+    drape_broad_phase_pairs(&u->broad, &want, list_pair, u);
+    if (u->out_of_memory || drape_sort_pairs(&u->sorter, u->close_pairs, u->pair_count))
         return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < u->near_count; i++)
-        consider(&g, &u->near[i]);
+    for (int32_t i = 0; i < u->pair_count; i++)
+        keep_gap(u, &u->close_pairs[i], reach);
     return u->out_of_memory ? DRAPE_E_MEMORY : DRAPE_OK;
 }

@@ -1,23 +1,19 @@
-/*
- * untangle.c: see untangle.h. The topology of all sheets, and the sweeps.
- */
-#include "contact/untangle.h"
+/* untangler.c: see untangler.h. The topology of all sheets, and the sweeps. */
+#include "untangle/workspace.h"
 
 #include "colliders/deformed.h"
-#include "contact/list.h"
-#include "contact/untangle_parts.h"
 #include "geometry/mesh_distance.h"
 
 #include <float.h>
 #include <string.h>
 
-#define ENOUGH   0.5  /* of the wanted gap: with which a sheet is clear */
-#define LESS     0.05 /* of the strain: by which a sweep that is worth it lessens it */
-#define POLISH   6    /* sweeps without such a gain that end it, once it is clear */
-#define PATIENCE 30   /* the same while gaps are too small */
-#define STRETCH  2.0  /* of an edge, at most: else the cloth is torn */
-#define SQUEEZE  0.25 /* of an edge, at least: else it has collapsed */
-#define SHARE    0.25 /* of a strain like these that is allowed if something still crosses */
+#define ENOUGH   0.5  /* share of the wanted gap: the cloth is clear if every gap is as large */
+#define LESS     0.05 /* a sweep is worth its cost if the strain falls by this share */
+#define POLISH   6    /* so many sweeps in a row that are not worth it are the last ones of clear cloth, */
+#define PATIENCE 30   /* and so many those of cloth whose gaps are too small */
+#define STRETCH  2.0  /* largest length of an edge, in the given one: longer ones are torn */
+#define SQUEEZE  0.25 /* smallest length of an edge, in the given one: shorter ones have collapsed */
+#define SHARE    0.25 /* share of the strain between these two allowed while something still crosses */
 
 /* ---- Topology ---- */
 
@@ -95,7 +91,7 @@ static drape_status list_sheets(drape_untangler *u)
     return DRAPE_OK;
 }
 
-/* Numbers the pieces of cloth that hang together. */
+/* Numbers the connected pieces of cloth. */
 static void list_pieces(drape_untangler *u)
 {
     const drape_sheets *s = &u->sheets;
@@ -207,10 +203,10 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
         u->mobility[i] = m->pinned[i] ? 0 : 1;
         u->area += u->broad.node_area[i];
     }
-    for (int32_t i = 0; i < m->support_count; i++) /* they would leave their planes */
+    for (int32_t i = 0; i < m->support_count; i++) /* supported nodes would leave their planes */
         u->mobility[m->supports[i].node] = 0;
     for (int32_t i = 0; m->image_set_count > 0 && i < m->image_start[m->image_set_count]; i++)
-        u->mobility[m->image[i]] = 0; /* nor would these keep their period */
+        u->mobility[m->image[i]] = 0; /* and nodes of periodic edges would lose their period */
     status = place_bodies(u, motion, t);
     if (!status) {
         drape_sheets *s = &u->sheets;
@@ -243,91 +239,12 @@ static drape_status set_up(drape_untangler *u, const drape_motion *motion, doubl
     return u->exit ? build_trees(u) : DRAPE_E_MEMORY;
 }
 
-void drape_untangle_bound(drape_untangler *u, const drape_half_space *bound)
-{
-    drape_half_space *list =
-        drape_list_grow(u->arena, u->bounds.list, u->bounds.count, &u->bounds.room, sizeof *list);
-    u->out_of_memory = u->out_of_memory || !list;
-    if (!list)
-        return;
-    u->bounds.list = list;
-    list[u->bounds.count++] = *bound;
-}
-
-/* ---- Projection ---- */
-
-/* Positions that keep all bounds, and lengths and bends as well as these allow: each is satisfied in turn by
- * the least move of its nodes (Mueller et al. 2007, Position based dynamics), again and again. Bounds come
- * last, so that they are kept best. */
-
-#define ITERATIONS 30
-#define BENDING    0.1 /* share of a change of a bend that is taken back at once */
-
-/* Moves two points apart or together along the line between them, by a share of what their distance lacks. */
-static void restore(drape_untangler *u, int32_t a, int32_t b, double length, double share)
-{
-    const double mobility = u->mobility[a] + u->mobility[b];
-    double *p = u->x + 3 * (size_t)a, *q = u->x + 3 * (size_t)b, d[3];
-    if (!(mobility > 0) || !(u->moved[a] || u->moved[b]))
-        return;
-    vec3_sub(q, p, d);
-    const double now = vec3_norm(d);
-    if (!(now > 0) || now == length)
-        return;
-    const double move = share * (now - length) / (now * mobility);
-    vec3_add_scaled(u->mobility[a] * move, d, p);
-    vec3_add_scaled(-u->mobility[b] * move, d, q);
-    u->moved[a] = u->moved[a] || u->mobility[a] > 0;
-    u->moved[b] = u->moved[b] || u->mobility[b] > 0;
-}
-
-static void keep_bound(drape_untangler *u, const drape_half_space *bound)
-{
-    double lacks = bound->bound, sum = 0;
-    for (int a = 0; a < 4 && bound->node[a] >= 0; a++) {
-        lacks -= bound->c[a] * vec3_dot(bound->normal, u->x + 3 * (size_t)bound->node[a]);
-        sum += u->mobility[bound->node[a]] * bound->c[a] * bound->c[a];
-    }
-    if (!(lacks > 0) || !(sum > 0))
-        return;
-    for (int a = 0; a < 4 && bound->node[a] >= 0; a++) {
-        const int32_t i = bound->node[a];
-        const double move = u->mobility[i] * bound->c[a] * lacks / sum;
-        vec3_add_scaled(move, bound->normal, u->x + 3 * (size_t)i);
-        u->moved[i] = u->moved[i] || move != 0;
-    }
-}
-
-/* Moves x to where bounds, lengths and bends are kept as well as possible. */
-static void project(drape_untangler *u)
-{
-    const drape_model *m = u->model;
-    for (int i = 0; i < ITERATIONS; i++) {
-        for (int32_t e = 0; e < m->edge_count; e++)
-            restore(u, m->edge[2 * (size_t)e], m->edge[2 * (size_t)e + 1], u->length[e], 1);
-        for (int32_t h = 0; h < u->hinge_count; h++)
-            restore(u, u->hinge[2 * (size_t)h], u->hinge[2 * (size_t)h + 1], u->hinge_length[h], BENDING);
-        for (int32_t b = 0; b < u->bounds.count; b++)
-            keep_bound(u, &u->bounds.list[b]);
-    }
-    /* No point goes farther than what was searched. */
-    const double most = drape_untangle_stride(u);
-    for (int32_t i = 0; i < u->model->node_count; i++) {
-        double *x = u->x + 3 * (size_t)i, move[3];
-        const double *from = u->start + 3 * (size_t)i;
-        vec3_sub(x, from, move);
-        const double length = vec3_norm(move);
-        for (int k = 0; length > most && k < 3; k++)
-            x[k] = from[k] + move[k] * (most / length);
-    }
-}
-
 /* ---- Sweeps ---- */
 
 /* Finds what is wrong with the present positions, and the bounds that mend it. */
-static drape_status look(drape_untangler *u)
+static drape_status analyse(drape_untangler *u)
 {
-    u->bounds.count = u->passage_count = 0;
+    u->bound_count = u->passage_count = 0;
     u->min_share = u->min_wanted = INFINITY;
     memset(u->passes, 0, (size_t)u->broad.points * sizeof *u->passes);
     memcpy(u->start, u->x, 3 * (size_t)u->broad.points * sizeof *u->x);
@@ -351,8 +268,8 @@ static double strain_of(const drape_untangler *u)
     return strain;
 }
 
-/* Whether it is still the cloth that was given: no edge is torn, and nothing has collapsed, whose
- * triangles have the area of those whose sides all have. */
+/* Whether the present positions are still the cloth that was given: no edge is torn, none has collapsed, and
+ * no triangle has less area than one all of whose sides are as short as they may be. */
 static bool is_sound(const drape_untangler *u)
 {
     const double share = u->crossing_count + u->sunk_count > 0 ? SHARE : 1, most = 1 + share * (STRETCH - 1),
@@ -368,15 +285,15 @@ static bool is_sound(const drape_untangler *u)
     return true;
 }
 
-/* What was reached in a sweep. Fewer crossings are better; then gaps of a part of the wanted ones, or
- * larger ones; then less strain. */
+/* What was reached in a sweep. Fewer crossings are better; then a larger smallest gap, up to the share that
+ * is enough; then less strain. */
 typedef struct rank {
     bool sound;
     int64_t crossings, sunk;
     double gap, strain;
 } rank;
 
-/* Whether a is better than b, and in no count worse than the start. */
+/* Whether a is better than b, and has no more crossings or sunk nodes than the first positions. */
 static bool is_better(const rank *a, const rank *b, const rank *first)
 {
     if (!a->sound || a->sunk > first->sunk || a->crossings - a->sunk > first->crossings - first->sunk)
@@ -386,8 +303,8 @@ static bool is_better(const rank *a, const rank *b, const rank *first)
     return a->gap != b->gap ? a->gap > b->gap : a->strain < b->strain;
 }
 
-/* Sweeps until nothing passes through anything, then for gaps, and then as long as there is strain that gets
- * less. */
+/* Sweeps until nothing passes through anything, then until gaps are large enough, and then as long as the
+ * strain falls. */
 static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, drape_untangle_outcome *outcome)
 {
     rank first = {0}, best = {0};
@@ -395,7 +312,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
     for (int i = 0;; i++) {
         if ((cancel && atomic_load(cancel)) || drape_check_cancel(u->ctx))
             return DRAPE_E_STOPPED;
-        const drape_status status = look(u);
+        const drape_status status = analyse(u);
         if (status)
             return status;
         outcome->sweeps = i;
@@ -422,7 +339,7 @@ static drape_status sweep_all(drape_untangler *u, const atomic_bool *cancel, dra
         if ((i == 0 && drape_untangle_is_clear(outcome)) || i == u->def->sweeps ||
             (clear && since >= POLISH) || (best.crossings == 0 && since >= PATIENCE))
             return DRAPE_OK;
-        project(u);
+        drape_untangle_project(u);
     }
 }
 

@@ -1,10 +1,10 @@
 /*
- * untangle_bodies.c: nodes and faces in closed colliders are pushed out along the signed distance. A piece of
+ * bodies.c: nodes and faces in closed colliders are pushed out along the signed distance. A piece of
  * cloth that is inside by a quarter or more would be torn where its nodes leave in different directions: it
  * leaves in one. Of a face that is in a collider between its nodes, it is the deepest of a grid of points, or
  * the middle of where edges of the collider pass through it.
  */
-#include "contact/untangle_parts.h"
+#include "untangle/workspace.h"
 
 #include "base/elementary.h"
 #include "base/pi.h"
