@@ -1127,7 +1127,7 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     drape_archive_mark(a, "system");
     if (a->by_ranks) { /* no host moves anything there */
         if (system->contact)
-            drape_contact_archive_press(system->contact, a);
+            drape_contact_archive_stiffness(system->contact, a);
         return;
     }
     drape_motion_archive(system->motion, a);

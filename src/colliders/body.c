@@ -191,9 +191,9 @@ static drape_status make_point(grid *g, int i, int j, int k)
 
 /* ---- Faces: one for each edge of the grid that is cut ---- */
 
-/* The normal of a corner is taken a little above it, on the side of the face: where the body is round it is
- * that of the body, and at an edge that of the side on which the face lies. Which side that is, the normal
- * a little towards the middle of the face tells. */
+/* The normal of a corner of a face is that of the distance a little above the corner, on the side of the
+ * face: on a round body it is the normal of the body, at an edge that of the side on which the face lies. The
+ * direction to that side is the normal a little towards the middle of the face. */
 static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
 {
     double middle[3] = {0}, normal[3], x[3];
@@ -283,8 +283,8 @@ void drape_body_follow(const drape_collider_shape *shape, drape_body *body)
             }
     }
     body->vertex_count = count;
-    /* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
-     * little from it; others stay crisp. */
+    /* A corner gets the mean normal of the triangles at its point, weighted by area, if its own normal
+     * differs little from the mean; otherwise the edge stays sharp. */
     double *sum = body->sum;
     memset(sum, 0, 3 * (size_t)shape->point_count * sizeof *sum);
     for (size_t i = 0; i < body->vertex_count; i++) {

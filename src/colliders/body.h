@@ -15,10 +15,10 @@ typedef struct drape_body {
     size_t vertex_count;    /* three for each triangle */
     double *sum;            /* (points of the shape x 3) workspace for normals; NULL: no triangles */
     bool endless;           /* unbounded, as a plane is */
-    double low[3], high[3]; /* bounding box [m]; of an endless body the box it is cut off at */
+    double low[3], high[3]; /* bounding box [m]; an endless body is cut off there */
 } drape_body;
 
-/* Draws the triangles of a shape, of which the body was made, where its points are now. */
+/* Updates a body that was made of the triangles of a shape to the present points of the shape. */
 void drape_body_follow(const drape_collider_shape *shape, drape_body *body);
 
 /* Makes the body in an arena. An endless one is cut off at twice `reach` [m] from center. Errors:

@@ -22,8 +22,8 @@ static void reduce(drape_active_contact *contact)
         contact->pair.node[a] = -1;
 }
 
-/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes
- * belongs to its own pair only, and so does one that depends on more than its nodes. */
+/* Whether several pairs can have this contact: one of two points, or of a point and an edge. A contact of
+ * four nodes belongs to its own pair only, and so does one that depends on more than its nodes. */
 static bool is_shared(const drape_active_contact *contact)
 {
     const int points = contact->gap.closest.points;
@@ -62,7 +62,7 @@ static bool is_same(const drape_active_contact *a, const drape_active_contact *b
 {
     int32_t key[3], other[3];
     if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
-        a->gap.closest.points != b->gap.closest.points || a->gentle != b->gentle || a->exempt != b->exempt)
+        a->gap.closest.points != b->gap.closest.points || a->inside != b->inside || a->exempt != b->exempt)
         return false;
     key_of(a, key);
     key_of(b, other);
@@ -143,13 +143,13 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
         if (!drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
             continue;
         contact.pair = *pair;
-        contact.gentle = false;
+        contact.inside = false;
         contact.exempt = drape_exempt_factor(exempt, pair);
         if (contact.exempt > 0 && !exempt->acts(exempt, pair))
             continue;
-        if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_GENTLE * pair->distance) {
-            contact.gentle = (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding)) ||
-                             has_pair(inside, pair);
+        if (!(contact.exempt > 0) && contact.gap.value < DRAPE_BARRIER_PARABOLA * pair->distance) {
+            contact.inside = has_pair(inside, pair) ||
+                             (all_inside && contact.gap.value < drape_pair_least_gap(pair, rounding));
             const drape_near_pair near = {.pair = *pair, .gap = contact.gap.value};
             if (!drape_list_append(set->arena, &set->near, &set->near_count, &set->near_capacity, &near,
                                    sizeof near))

@@ -10,33 +10,31 @@
 #include "contact/candidates.h"
 #include "contact/exempt.h"
 
-/* The pairs that began below their least gap, at the start of a run or after its state was set, and have not
- * come out yet. A pair is known by its pieces. */
-
-/* A pair that is nearer than DRAPE_BARRIER_GENTLE activation distances. */
+/* A near pair: its gap is less than DRAPE_BARRIER_PARABOLA activation distances. */
 typedef struct drape_near_pair {
     drape_pair pair;
     double gap; /* [m] */
 } drape_near_pair;
 
-/* The pieces of a pair. */
+/* The pieces of a pair, by which it is known. */
 typedef struct drape_pair_key {
     int32_t kind, collider, node[4];
 } drape_pair_key;
 
+/* The pairs that are inside: they began below their least gap, at the start of a run or after its state was
+ * set, and have been near ever since. */
 typedef struct drape_inside_pairs {
     drape_arena *arena;
     drape_pair_key *keys; /* (count of capacity), ascending */
     int32_t count, capacity;
 } drape_inside_pairs;
 
-/* Keeps those of its pairs that are among the near ones, for at the others both barriers agree, and adds
- * those that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */
+/* Removes the pairs that are not among the near ones, at whose gaps both barriers are equal, and adds the
+ * near pairs that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */
 bool drape_inside_update(drape_inside_pairs *inside, const drape_near_pair *near, int32_t count,
                          double rounding, drape_status *status);
 
-/* Adds a pair that is not among them. They are complete again after drape_inside_sort. Errors:
- * DRAPE_E_MEMORY. */
+/* Adds a pair that is not among them; drape_inside_sort must follow the last one. Errors: DRAPE_E_MEMORY. */
 drape_status drape_inside_add(drape_inside_pairs *inside, const drape_pair_key *key);
 void drape_inside_sort(drape_inside_pairs *inside);
 
@@ -45,7 +43,7 @@ void drape_inside_archive(drape_inside_pairs *inside, drape_archive *a);
 typedef struct drape_active_contact {
     drape_pair pair; /* its nodes are the points of the gap; -1 for points that do not exist */
     drape_gap gap;
-    bool gentle;   /* its pairs began below the least gap: see barrier.h */
+    bool inside;   /* its pairs are inside, and have a barrier that pushes them out more softly (barrier.h) */
     double exempt; /* factor of the pressure of exempt pairs (exempt.h); 0: they are held */
 } drape_active_contact;
 
@@ -59,9 +57,10 @@ typedef struct drape_active_set {
     int32_t near_count, near_capacity;
 } drape_active_set;
 
-/* Lists the active contacts of a configuration at these distances from the paths of the candidates. Those of
- * pairs inside are gentle; all_inside: those of all pairs below their least gap are, for outside of steps no
- * others are. Exempt pairs are not near. Errors: DRAPE_E_MEMORY. */
+/* Lists the active contacts, and the near pairs that are not exempt, of a configuration at these distances
+ * from the paths of the candidates. inside: the pairs that are inside. all_inside: so is every other pair
+ * below its least gap, as outside of steps, where nothing but a placed state can be there. Errors:
+ * DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,
                                    const drape_inside_pairs *inside, bool all_inside,

@@ -4,10 +4,10 @@
  *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
  * C2 at s = 1. Below s = low it continues as its osculating parabola, also for s < 0, so that it is
  * finite everywhere. For most pairs, low is the least gap that a step may end with (pair.h): the force
- * withstands 1/low times the stiffness there, and the parabola is met only by trial states. For pairs
- * that began below the least gap, low is DRAPE_BARRIER_GENTLE: they are pushed out with a force that is
- * finite in a practical sense, too. Exempt pairs (exempt.h) have another law, the bounded
- * barrier: with y = 1 - s > 0
+ * withstands 1/low times the stiffness there, and only trial states are on the parabola. For pairs
+ * that are inside (active.h), low is DRAPE_BARRIER_PARABOLA, so that the force which pushes them out is
+ * moderate at any depth of practice. Exempt pairs (exempt.h) have another law, the bounded barrier: with
+ * y = 1 - s > 0
  *     b = y^3 / (1 + y)^2,   -b' = (y^3 + 3 y^2) / (1 + y)^3 < 1
  * also C2 at s = 1 and convex, whose force tends to 1 with depth.
  */
@@ -18,8 +18,8 @@
 
 #include <math.h>
 
-#define DRAPE_BARRIER_GENTLE  0.1
-#define DRAPE_BARRIER_BOUNDED (-INFINITY) /* as low: the bounded barrier, which no depth leaves */
+#define DRAPE_BARRIER_PARABOLA 0.1
+#define DRAPE_BARRIER_BOUNDED  (-INFINITY) /* as low: selects the bounded barrier */
 
 typedef struct drape_barrier {
     double b, db, ddb; /* b, b', b'' */

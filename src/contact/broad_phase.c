@@ -6,11 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-/* Points and segments of colliders up to which the trees of the cloth are not fitted for them: to fit costs
- * as much as twenty scans. */
+/* Up to so many points and segments of colliders, the elements of the cloth are scanned for each of them: to
+ * fit the trees of the cloth costs as much as twenty scans. */
 #define FEW 16
-/* Activation distance of round features, in the depth by which the middle of an edge may be nearer than its
- * ends: where nodes are held by a wide distance from a fast body, their edges are held by them. */
+/* Upper bound of the activation distance of round features, in the depth by which the middle of an edge may
+ * be nearer than its ends. A fast body has a larger one, which holds the nodes; these hold the edges. */
 #define SAGS 2
 
 /* ---- Creation ---- */
@@ -68,8 +68,8 @@ static void share_areas(drape_broad_phase *s)
             0.5 * (s->node_area[m->edge[2 * (size_t)e]] + s->node_area[m->edge[2 * (size_t)e + 1]]);
 }
 
-/* How much nearer to a round feature of radius r, or deeper inside, the middle of an edge is than its ends on
- * the surface. */
+/* How much nearer to a round feature of radius r the middle of an edge is than its ends, which are on the
+ * surface. */
 static double sag(double r, double edge)
 {
     const double half = 0.5 * edge;
@@ -213,7 +213,7 @@ static bool is_marked(const bool *marked, const int32_t *node, int nodes)
     return !marked;
 }
 
-/* The other piece of a pair of cloths has its last node; at a collider one piece has nodes of cloth alone. */
+/* Whether the model ignores a pair. Nodes 0 and 3 are of different pieces, one of which is of cloth. */
 static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
 {
     const int32_t *n = pair->node, nodes = s->model->node_count;
@@ -234,7 +234,7 @@ static void report(query *q, int32_t piece, const drape_path_bvh *tree, int32_t 
         q->visit(q->user, &q->pair);
 }
 
-/* Both of cloth with cloth, which have stages of their own. */
+/* Queries of nodes and faces and of edges of cloth, which are two stages of one search. */
 typedef struct self_query {
     query face, edge;
 } self_query;
@@ -304,7 +304,7 @@ static void begin_stage(query *q, int32_t stage, drape_pair_kind kind)
     q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
 }
 
-/* How far from the features of a collider pairs are wanted, without the reach of the query [m]. */
+/* Up to which gap [m] from the features of a collider pairs are wanted, without the reach of the query. */
 static double feature_reach(const drape_broad_phase *s, int32_t collider, bool passing)
 {
     return drape_broad_phase_wanted(s, passing, drape_broad_phase_feature_distance(s, collider));
@@ -340,11 +340,11 @@ static void scanned(void *user, int32_t element)
     of->meet(of->query, of->feature, element);
 }
 
-/* What is scanned: all of the cloth, or the elements that have a marked node. */
+/* The nodes that are scanned: all of the cloth, or those of elements that have a marked node. */
 typedef struct scanned_cloth {
-    const int32_t *node; /* that these have; NULL: all */
+    const int32_t *node; /* (nodes); NULL: all nodes of the model */
     int32_t nodes;
-    double edge; /* [m] no edge of these is longer on the path */
+    double edge; /* [m] upper bound of the lengths of edges between them on the path */
 } scanned_cloth;
 
 static double square_of_edge(const drape_model *m, const drape_broad_query *want, int32_t edge)
@@ -360,7 +360,7 @@ static double square_of_edge(const drape_model *m, const drape_broad_query *want
     return largest;
 }
 
-/* All nodes, and the clusters by which list_near passes over most of them. */
+/* All nodes. The balls around clusters are fitted, by which drape_distant_mark passes over most nodes. */
 static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *want)
 {
     double largest = 0;
@@ -372,7 +372,7 @@ static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *wa
     return (scanned_cloth){.nodes = s->model->node_count, .edge = sqrt(largest)};
 }
 
-/* Adds those nodes of some elements that are not listed yet. */
+/* Lists the nodes of some elements that are not listed yet. */
 static void list_nodes(drape_broad_phase *s, const drape_path_bvh *tree, const int32_t *element,
                        int32_t elements, scanned_cloth *to)
 {
@@ -386,7 +386,8 @@ static void list_nodes(drape_broad_phase *s, const drape_path_bvh *tree, const i
     }
 }
 
-/* A face with a marked node may have one edge without, which is not longer than the other two together. */
+/* The nodes of elements that have a marked node. One edge of such a face may have no marked node; it is not
+ * longer than the other two together. */
 static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query *want)
 {
     const int32_t *face = s->faces_of.first, *edge = s->edges_of.first;
@@ -407,8 +408,8 @@ static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query 
     return some;
 }
 
-/* Whether a node is so far from a collider on the whole path that no element which has it can meet a feature,
- * since these lie within the surface. */
+/* Whether a node is farther than the reach from a collider on its whole path. Then no element that has the
+ * node can meet a feature, since features lie within the surface. */
 static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
                        int32_t node, double reach)
 {
@@ -422,16 +423,16 @@ static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want
     return distant;
 }
 
-/* The gap from which on nodes keep an element from features: where the square of the distance from a point
- * or a segment is at least D^2 at the corners, it is nowhere less than D^2 less a third of the square of the
- * longest edge. */
+/* The gap of the nodes of an element at which the element keeps another gap: if the square of the distance
+ * from a point or a segment is at least D^2 at the corners, it is at least D^2 less a third of the square of
+ * the longest edge everywhere on the element. */
 static double gap_of_nodes(double radius, double gap, double edge)
 {
     return sqrt((radius + gap) * (radius + gap) + edge * edge / 3) - radius;
 }
 
-/* Lists those elements of a tree all of whose nodes are near, and one is close: each at the first node that
- * is. */
+/* Lists the elements all of whose nodes are near and one of which is close, each once: at the first node that
+ * is both. */
 static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
                                          const drape_elements_of *of, int32_t points)
 {
@@ -467,13 +468,14 @@ static void scan_tree(query *q, const drape_path_bvh *features, int32_t feature,
     drape_path_bvh_scan(tree, &from, among, want->marked, q->broad->side, scanned, &(scan){q, feature, meet});
 }
 
-/* The features of colliders without triangles, if they are few, by a look at the cloth near each of them. */
+/* Finds the pairs with features of colliders that have no triangles, by a scan of the cloth near each
+ * feature. */
 static void scan_features(query *q)
 {
     drape_broad_phase *s = q->broad;
     const drape_model *m = s->model;
     const bool *marked = q->want->marked;
-    scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* listed where they are needed first */
+    scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* -1: not listed yet */
     int32_t segment = 0;
     set_reaches(s, q->want->passing);
     for (int32_t k = 0; k < m->collider_count; k++) {
@@ -485,9 +487,8 @@ static void scan_features(query *q)
         scanned_cloth *of = only_marked ? &some : &all;
         if (of->edge < 0)
             *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
-        /* Marks and lists the nodes of elements that a collider may meet: all nodes of one are near, one
-         * is close. All of them if it turns: its features move straight, which is no straight path in its
-         * coordinates. */
+        /* Marks and lists the nodes that are near or close. If the collider turns, these are all: its
+         * features move straight in space, which is not straight in its coordinates. */
         const drape_broad_query *want = q->want;
         const drape_collider_pose *const pose[2] = {&want->pose[0][k], &want->pose[want->y ? 1 : 0][k]};
         const bool turns = (pose[0]->turned || pose[1]->turned) &&

@@ -24,21 +24,22 @@ typedef struct drape_broad_phase {
     drape_path_bvh corners, segment_tree; /* points and segments of colliders; */
     drape_path_bvh obstacles; /* their triangles, of those without a smooth distance: their boxes are
                                  enlarged by how far from them contact begins */
-    double *corner_reach, *segment_reach, *obstacle_reach; /* [m] that */
+    double *corner_reach, *segment_reach, *obstacle_reach; /* [m] this enlargement */
     int32_t *segment;                                      /* (segments x 2) of colliders */
     int32_t *segment_collider;
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    drape_distant distant;                /* nodes far from smooth colliders */
-    uint8_t *side;                        /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
-    bool *near, *close;                   /* (node_count) scratch: nodes that a collider may meet, */
-    int32_t *near_node, *near_element;    /* (node_count), (edges or triangles) and lists of what it may */
+    drape_distant distant; /* nodes far from smooth colliders */
+    uint8_t *side;         /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
+    bool *near, *close;    /* (node_count) scratch: an element can meet a feature of a collider if all
+                                             of its nodes are near and one is close */
+    int32_t *near_node, *near_element;    /* (node_count), (edges or triangles) scratch: lists of these */
     int32_t *marked_node;                 /* (node_count) scratch: the nodes of marked elements */
     drape_elements_of faces_of, edges_of; /* of each node, by feature scans */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
-    double *feature_most;   /* (collider_count) that of its features is no more than this [m] */
+    double *feature_most;   /* (collider_count) upper bound of the activation distance of its features [m] */
     double rounding;        /* what rounding can change in a gap, set by who moves the points [m] */
     double obstacle_radius; /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;
@@ -55,10 +56,9 @@ typedef struct drape_broad_query {
     const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
-/* Calls visit for every such pair, in an order that does not depend on the positions; sorted by rank they
- * have one that does not depend on the search either. Left out are pairs whose nodes are all pinned,
- * pairs that the model ignores, and pairs with surfaces, since every free node is paired with all of
- * them. */
+/* Calls visit for every such pair, in an order that does not depend on the positions; the order by rank does
+ * not depend on the search either. Left out are pairs whose nodes are all pinned, pairs that the model
+ * ignores, and pairs with smooth surfaces, since every free node makes a pair with each of these. */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const drape_broad_query *want,
                              drape_broad_phase_visit *visit, void *user);

@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-#define MAX_PATCH 0.3 /* of the nodes: if more have left their path, all pairs are searched */
+#define MAX_PATCH 0.3 /* share of the nodes: if more have left their path, all pairs are searched */
 
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out)
@@ -68,7 +68,7 @@ static double move_to_surface(const drape_straight_path *path, const drape_pair 
     return vec3_norm(move);
 }
 
-/* A lower bound of the gap on the path. The gap is exact if the ends are the same, unless it is at least
+/* A lower bound of the gap on the path: the gap itself if both ends are the same and it is less than
  * enough. */
 static double least_gap(const search *s, const drape_pair *pair, double enough)
 {
@@ -218,8 +218,8 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
-/* How much farther nodes are from their paths in the coordinates of a turned collider, in which these were
- * straight, than in space. Counted are the nodes that were not marked for a later set. */
+/* How much farther nodes are from their paths in the coordinates of a turned collider, in which the search
+ * took these paths to be straight, than in space. Nodes that were marked for a later set do not count. */
 static double distance_of_turned(const drape_candidates *c, int set, const drape_configuration *at,
                                  int32_t collider, double t)
 {
@@ -261,8 +261,9 @@ static double square_of_point(const drape_candidate_set *from, const double *x, 
     return square_away(x + i, from->x[0] + i, from->x[1] + i, t);
 }
 
-/* The largest distance from the path of a set, of the points and colliders that were not marked for a later
- * one. INFINITY if it is above the margin. Notes those of each, if `last` the larger one of both ends. */
+/* The largest distance from the path of a set, among the points and colliders that were not marked for a
+ * later set; INFINITY if it is above the margin. Notes the distance of each; if `last`, the larger one of
+ * both ends. */
 static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool last)
 {
     const drape_candidate_set *from = &c->set[set];
@@ -309,8 +310,8 @@ double drape_candidates_farthest(const drape_candidates *c, const drape_distance
     return largest <= c->margin ? largest : INFINITY;
 }
 
-/* Notes of which sets the path is beyond the margin at each point and collider. Returns false if a
- * position is not finite. */
+/* Notes, for each point and collider, from the paths of which sets it is farther than the margin. Returns
+ * false if a position is not finite. */
 static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
 {
     const int32_t points = c->broad->points, count = points + c->broad->model->collider_count;
@@ -333,8 +334,9 @@ static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
     return true;
 }
 
-/* Marks what a patch must have whose set follows the first `sets` ones, of what was noted. Returns the
- * number of nodes among it. */
+/* Marks the points and colliders that must be in a patch which follows the first `sets` sets: those that have
+ * left the paths of these sets, and those of the patches that it replaces. Returns the number of marked
+ * nodes. */
 static int32_t mark(drape_candidates *c, int sets)
 {
     const drape_broad_phase *broad = c->broad;
@@ -352,8 +354,9 @@ static int32_t mark(drape_candidates *c, int sets)
     return count;
 }
 
-/* After how many sets a patch is searched on the path, which marks what it must have: after all, or in place
- * of all patches if that is fewer or there is no room. 0: all pairs are searched. */
+/* After how many sets the next patch is searched, whose points and colliders are marked: after all sets, or
+ * after the first one, in place of all patches, if that marks fewer nodes or all sets are in use. 0: all
+ * pairs are searched. */
 static int choose_set(drape_candidates *c, const drape_straight_path *path)
 {
     const int32_t nodes = c->broad->model->node_count;
@@ -409,8 +412,8 @@ void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
 
 /* ---- The list ---- */
 
-/* Whether the gap can be below the activation distance: each piece is at most as far from where it was found
- * as the farthest of its points. */
+/* Whether the gap can be below the activation distance, since the search found it: each piece has moved off
+ * its path by at most the largest distance of its points. */
 static bool may_become_active(const drape_candidates *c, int set, const drape_pair *pair,
                               const drape_distances *away)
 {
@@ -431,7 +434,8 @@ static bool may_become_active(const drape_candidates *c, int set, const drape_pa
     return slack < first + second + 2 * away->stray;
 }
 
-/* Whether the pair is of the last set for which one of its pieces was marked. */
+/* Whether the set is the last one for which a piece of the pair was marked: other sets have outdated copies
+ * of the pair. */
 static bool is_of(const drape_candidates *c, const drape_pair *pair, int set)
 {
     const int points = drape_pair_points(pair);

@@ -1,13 +1,14 @@
 /*
- * candidates.h: the candidate pairs, found by the broad phase along a straight path of all points, and valid
- * for a configuration if no point is farther than the margin from its place at some step fraction of the
- * path, the same for all points.
+ * candidates.h: the candidate pairs, found by the broad phase along a straight path of all points. They are
+ * valid for a configuration if there is a step fraction of the path, the same for all points, at which no
+ * point is farther than the margin from its place in the configuration.
  *
- * Where some points or colliders have left the path, a patch is searched instead of all: along a new path of
- * all points, the pairs that have one of these. They replace the pairs of earlier searches that have one. So
- * layers of cloth are not searched because a collider moves, and of a correction that is shortened again and
- * again only what meets something each time. The rank of pairs depends on the pieces alone: sums over the
- * active ones, in this order, have the same bits wherever searches were made.
+ * Where only some points or colliders have left the path, a patch is searched: the pairs that have one of
+ * these points or colliders, along a new path of all points. The pairs of a patch replace those of earlier
+ * searches that have one of them. So layers of cloth are not searched again because a collider moves, and of
+ * a correction that is shortened again and again only the part that meets something is searched each time.
+ * The rank of pairs depends on the pieces alone: sums over the active pairs, in this order, have the same
+ * bits wherever searches were made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H
 #define DRAPE_CONTACT_CANDIDATES_H
@@ -25,7 +26,7 @@ typedef struct drape_candidate_set {
     bool known;                   /* there was memory for everything that the search found */
     double *x[2];                 /* (points x 3) the ends of its path */
     drape_collider_pose *pose[2]; /* (collider_count) */
-    double *away; /* (points + collider_count) how far from its path each is, on the path measured last [m] */
+    double *away; /* (points + collider_count) [m] the distance of each from its path, as last measured */
     drape_pair *pairs; /* (count of capacity) including those with surfaces, by increasing rank */
     int32_t count, capacity;
 } drape_candidate_set;
@@ -35,13 +36,12 @@ typedef struct drape_candidate_set {
 typedef struct drape_candidates {
     drape_arena *arena;
     drape_broad_phase *broad;
-    double margin; /* how far points may be from the paths [m] */
-    drape_candidate_set
-        set[DRAPE_CANDIDATE_SETS]; /* of all pairs, and patches, each later than those before */
-    int sets;                      /* that are in use; 0: no search was made */
-    uint8_t *level;  /* (points + collider_count) the last set for which a point or collider was marked; 0 */
+    double margin;                                 /* how far points may be from the paths [m] */
+    drape_candidate_set set[DRAPE_CANDIDATE_SETS]; /* set 0 is of all pairs, later ones are patches */
+    int sets;                                      /* number of sets in use; 0: no search was made */
+    uint8_t *level;  /* (points + collider_count) the last set for which each was marked; 0: set 0 */
     bool *marked;    /* (points + collider_count) of the search in progress */
-    uint8_t *beyond; /* (points + collider_count) bits of the sets from whose path it is too far */
+    uint8_t *beyond; /* (points + collider_count) a bit for each set from whose path it is too far */
     bool *stale;     /* (collider_count) whose pairs have another activation distance by now */
     drape_pair_sorter sorter;
 } drape_candidates;
@@ -51,9 +51,9 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
                                      drape_candidates *out);
 
 /* Calls visit, in the order of the broad phase, for all pairs that can become active while no point is
- * farther than margin from the path; if `passing`, only those of features whose gap can fall to its least.
- * marked: NULL for all, or (points + collider_count) those of which a pair must have one. The points of a
- * marked collider must be marked, too. */
+ * farther than the margin from the path; if `passing`, only for pairs of features whose gap can fall to the
+ * least one. marked: (points + collider_count) a pair must have a marked piece; NULL: all pairs. The points
+ * of a marked collider must be marked, too. */
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
                            bool passing, const bool *marked, drape_broad_phase_visit *visit, void *user);
 
@@ -70,16 +70,18 @@ void drape_candidates_forget(drape_candidates *candidates);
 /* The activation distance of a collider has changed: its pairs are searched anew. */
 void drape_candidates_forget_collider(drape_candidates *candidates, int32_t collider);
 
-/* How far a straight path is from those of each search. */
+/* How far a straight path is from the paths of the searches. */
 typedef struct drape_distances {
-    double set[DRAPE_CANDIDATE_SETS]; /* [m] the largest of all points; of each: drape_candidate_set.away */
-    double stray;                     /* [m] by which points may be farther, set by who knows of it */
-    double beyond;                    /* [m] of the activation distance: so far off may pairs stay, too */
+    double set
+        [DRAPE_CANDIDATE_SETS]; /* [m] the largest of all points; those of each: drape_candidate_set.away */
+    double stray; /* [m] by which points may be farther away than was measured; the caller sets it */
+    double
+        beyond; /* [m] pairs are wanted up to so far beyond their activation distance; the caller sets it */
 } drape_distances;
 
-/* The distances of a path: as far as its ends are, at most. Those of each point are kept until the
- * next call. INFINITY if there was no search, or if a position is not finite or beyond the margin;
- * those after such a one are not measured. */
+/* Measures the distances of a path, which are largest at one of its ends. The distances of single points are
+ * kept until the next call. The distance from a set is INFINITY if there was no search, or if a position is
+ * not finite or beyond the margin; later sets are then not measured. */
 drape_distances drape_candidates_distances(const drape_candidates *candidates,
                                            const drape_straight_path *path);
 

@@ -1,6 +1,6 @@
-/* ccd.c: continuous collision detection: the step fraction of a straight displacement without collisions. See
- * contact.h. */
-#include "contact/parts.h"
+/* ccd.c: continuous collision detection: the step fraction of a straight displacement without collisions, and
+ * what cloth could meet within some time. See contact.h. */
+#include "contact/contact_parts.h"
 
 #include "base/clock.h"
 #include "base/vec3.h"
@@ -11,7 +11,7 @@
 #define MAX_THROW 1.0 /* in mean edges: to what a displacement beyond the size of the scene is shortened */
 
 /* A displacement of all points, and the first pair that limits it. */
-typedef struct path {
+typedef struct pursuit {
     const double *x, *y;        /* (points x 3) */
     const drape_swings *swings; /* NULL: no collider turns */
     double stray;               /* [m] how far points of colliders leave straight paths */
@@ -19,17 +19,17 @@ typedef struct path {
     double fraction; /* of pairs of features */
     double surface_fraction;
     drape_pair limiting;
-    double *of_node;      /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
-    const double *before; /* (nodes) pairs whose nodes all have 1 limit nothing; NULL: none is known */
-    int32_t nodes;
-    const drape_exempt *exempt;    /* its pairs limit nothing */
-    const drape_contact *surfaces; /* its surfaces limit nodes, too; NULL: they do not */
-    const atomic_bool *cancel;     /* NULL: nothing ends the search early */
-    bool cancelled;                /* pairs have been left out */
-} path;
+    double *of_node;           /* (nodes) the smallest fraction of a pair at each node; NULL: not wanted */
+    const double *before;      /* (nodes) pairs whose nodes all have 1 limit nothing; NULL: none is known */
+    const drape_contact *c;    /* its exempt pairs limit nothing */
+    bool surfaces;             /* smooth surfaces of colliders limit nodes, too */
+    const atomic_bool *cancel; /* NULL: nothing ends the search early */
+    bool cancelled;            /* pairs have been left out */
+} pursuit;
 
-/* Whether the gap falls below the activation distance on the path; close to that it may be missed. */
-static bool comes_near(const path *p, const drape_pair *pair, double gap)
+/* Whether the gap of a pair falls below its activation distance on the path. A gap that just reaches this
+ * distance may be missed. */
+static bool comes_near(const pursuit *p, const drape_pair *pair, double gap)
 {
     const double rounding = p->keep->rounding, least = drape_pair_least_gap(pair, rounding);
     const drape_keep near = {
@@ -37,15 +37,15 @@ static bool comes_near(const path *p, const drape_pair *pair, double gap)
     return gap < pair->distance || drape_pair_step_fraction(pair, p->x, p->y, p->swings, &near, 1) < 1;
 }
 
-/* A node that stays beyond the distance by which a path from beyond is cut short is not limited by a
- * surface. So only candidates are, of colliders whose pairs are listed from that distance on. */
+/* Whether the candidates contain all nodes that a collider can limit: a node is limited only within the
+ * activation distance of the scene (drape_contact_march). */
 static bool lists_limits(const drape_contact *c, int32_t collider)
 {
     return c->broad.distance[collider] >= c->model->contact.distance;
 }
 
 /* A node and the smooth surface of a collider that rests. */
-static void follow_surface(const drape_contact *c, int32_t collider, int32_t node, path *p)
+static void follow_surface(const drape_contact *c, int32_t collider, int32_t node, pursuit *p)
 {
     const size_t at = 3 * (size_t)node;
     const drape_collider_pose *pose = &c->path_pose[collider];
@@ -57,41 +57,37 @@ static void follow_surface(const drape_contact *c, int32_t collider, int32_t nod
         p->of_node[node] = fmin(p->of_node[node], own);
 }
 
-/* Whether it is known that a pair limits nothing. */
-static bool is_known(const path *p, const drape_pair *pair, int points)
-{
-    bool known = p->before;
-    for (int k = 0; known && k < points; k++)
-        known = pair->node[k] >= p->nodes || p->before[pair->node[k]] == 1;
-    return known;
-}
-
-/* A pair that does not come near limits nothing, so it makes no difference whether it is a candidate. Does
- * not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
- * approaches so slowly relative to its speed that searching each to its own end would take for ever. Of equal
- * fractions that of the pair of lower rank counts, in whichever order pairs come. */
+/* Follows a pair along the path. A pair that does not come near limits nothing, so it makes no difference
+ * whether it is a candidate. Does not search beyond the step fraction that another pair leaves: if forces
+ * throw nodes very far, a pair approaches so slowly relative to its speed that searching each to its own end
+ * would take for ever. Of two pairs with the same fraction the one of lower rank counts, in whichever order
+ * pairs come. */
 static void follow(void *user, const drape_pair *pair)
 {
-    path *p = user;
+    pursuit *p = user;
     const drape_configuration from = {.x = p->x};
-    p->cancelled = p->cancelled || (p->cancel && atomic_load(p->cancel));
+    const int32_t nodes = p->c->model->node_count;
     const int points = drape_pair_points(pair);
-    if (p->cancelled || is_known(p, pair, points))
+    bool known = p->before; /* that the pair limits nothing */
+    for (int k = 0; known && k < points; k++)
+        known = pair->node[k] >= nodes || p->before[pair->node[k]] == 1;
+    p->cancelled = p->cancelled || (p->cancel && atomic_load(p->cancel));
+    if (p->cancelled || known)
         return;
     if (points == 1) {
-        if (p->surfaces && lists_limits(p->surfaces, pair->collider))
-            follow_surface(p->surfaces, pair->collider, pair->node[0], p);
+        if (p->surfaces && lists_limits(p->c, pair->collider))
+            follow_surface(p->c, pair->collider, pair->node[0], p);
         return;
     }
     if (drape_bound_is_apart(pair, p->x, p->y, pair->distance + pair->radius + p->stray) ||
-        drape_exempt_factor(p->exempt, pair) > 0)
+        drape_exempt_factor(p->c->exempt, pair) > 0)
         return;
     const double limit = p->of_node ? 1 : fmin((1 + 4 * DBL_EPSILON) * p->fraction, 1);
     const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->swings, p->keep, limit);
     if (fraction >= limit || !comes_near(p, pair, drape_pair_gap_value(pair, &from)))
         return;
     for (int k = 0; p->of_node && k < 4; k++) /* what limits the displacement of each node */
-        if (pair->node[k] < p->nodes)
+        if (pair->node[k] < nodes)
             p->of_node[pair->node[k]] = fmin(p->of_node[pair->node[k]], fraction);
     if (fraction > p->fraction || (fraction == p->fraction && !drape_pair_is_before(pair, &p->limiting)))
         return;
@@ -99,29 +95,23 @@ static void follow(void *user, const drape_pair *pair)
     p->limiting = *pair;
 }
 
-static double longest_move(const drape_contact *c, const path *p)
+static double longest_move(const pursuit *p)
 {
     double largest = 0, move[3];
-    for (size_t i = 0; i < (size_t)c->broad.points; i++) {
+    for (size_t i = 0; i < (size_t)p->c->broad.points; i++) {
         vec3_sub(p->y + 3 * i, p->x + 3 * i, move);
         largest = fmax(largest, vec3_dot(move, move));
     }
     return sqrt(largest);
 }
 
-/* Points that stray from the path are farther from that of the candidates. */
+/* The candidates if they are valid although points stray from the path; else NULL. */
 static const drape_candidates *with_stray(const drape_candidates *candidates, double stray,
                                           drape_distances *away)
 {
     away->stray = stray;
     return candidates && drape_candidates_farthest(candidates, away) <= candidates->margin ? candidates
                                                                                            : NULL;
-}
-
-/* Whether nothing limits the path but a gap that falls to its least. */
-static bool keeps_least(const drape_keep *keep)
-{
-    return keep->above == 0 && keep->arrival == 0;
 }
 
 double drape_contact_stray(const drape_collider *collider, double angle)
@@ -135,38 +125,39 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
                                    drape_pair *limiting)
 {
     const drape_swings swings = {.of = swing, .nodes = c->model->node_count};
+    const bool only_least =
+        keep->above == 0 && keep->arrival == 0; /* only gaps that fall to the least one limit */
     double stray = 0;
     for (int32_t k = 0; swing && k < c->model->collider_count; k++)
         stray =
             fmax(stray, swing[k].turns ? drape_contact_stray(&c->model->colliders[k], swing[k].angle) : 0);
-    path p = {.x = straight->end[0].x,
-              .y = straight->end[1].x,
-              .swings = swing ? &swings : NULL,
-              .stray = stray,
-              .keep = keep,
-              .fraction = 1,
-              .of_node = of_node,
-              .before = before,
-              .nodes = c->model->node_count,
-              .surface_fraction = 1,
-              .surfaces = of_surfaces ? c : NULL,
-              .cancel = cancel,
-              .exempt = c->exempt};
+    pursuit p = {.x = straight->end[0].x,
+                 .y = straight->end[1].x,
+                 .swings = swing ? &swings : NULL,
+                 .stray = stray,
+                 .keep = keep,
+                 .fraction = 1,
+                 .of_node = of_node,
+                 .before = before,
+                 .c = c,
+                 .surface_fraction = 1,
+                 .surfaces = of_surfaces,
+                 .cancel = cancel};
     drape_distances away;
     drape_candidate_cursor cursor = {0};
-    /* The candidates that are valid on the whole path, and how far it is from theirs: as far as its ends are,
-     * at most. Searched if there are none; NULL for a path that is too long or on which only few pairs
-     * matter, or if there is no memory. */
+    /* The candidates that are valid on the whole path; searched if there are none. NULL if the path is too
+     * long for candidates, if only few pairs matter on it, or if memory is out: then pairs are followed as
+     * they are found. */
     const drape_candidates *candidates =
         with_stray(drape_contact_valid_candidates(c, straight, &away), stray, &away);
-    if (!candidates && !keeps_least(keep) && !(longest_move(c, &p) > DRAPE_LONGEST_SEARCH * c->mean_edge))
+    if (!candidates && !only_least && !(longest_move(&p) > DRAPE_LONGEST_SEARCH * c->mean_edge))
         candidates = with_stray(drape_contact_search(c, straight, &away), stray, &away);
     const drape_pair *pair;
     while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
         follow(&p, pair);
     if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_candidates_find(&c->broad, straight, stray / 2, keeps_least(keep), NULL, follow, &p);
+        drape_candidates_find(&c->broad, straight, stray / 2, only_least, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)
@@ -177,6 +168,12 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
         *of_surfaces = p.surface_fraction;
     *limiting = p.limiting;
     return p.cancelled ? -1 : p.fraction;
+}
+
+drape_keep drape_contact_keep_step(const drape_contact *c)
+{
+    return (drape_keep){
+        .rounding = c->broad.rounding, .least = DRAPE_KEPT_GAP, .below = DRAPE_KEPT_GAP, .core = true};
 }
 
 double drape_contact_least_gap(const drape_contact *c)
@@ -203,7 +200,7 @@ static double distance_on(const drape_collider *collider, const own_path *along,
     return collider->ops->distance(collider->values, &collider->shape, at, NULL, NULL);
 }
 
-/* By steps of the length of the distance, with which no path can cross the surface. */
+/* Goes along the path in steps as long as the distance from the surface, none of which can cross it. */
 double drape_contact_march(const drape_contact *c, int32_t k, const drape_collider_pose *from,
                            const drape_collider_pose *to, const drape_swing *swing, const double *x,
                            const double *y, const drape_keep *keep)
@@ -237,7 +234,7 @@ double drape_contact_march(const drape_contact *c, int32_t k, const drape_collid
     return t;
 }
 
-/* How far the node goes that goes farthest, beyond the mean motion of all, which brings nothing together. */
+/* The longest displacement of a node relative to the mean displacement, which brings nothing together. */
 static double farthest_throw(const drape_contact *c, const double *x, const double *y)
 {
     const size_t nodes = (size_t)c->model->node_count;
@@ -255,20 +252,13 @@ static double farthest_throw(const drape_contact *c, const double *x, const doub
     return sqrt(drape_ranks_largest(c->ranks, largest));
 }
 
-/* A correction that throws nodes farther than the scene is large is of no use, and a search among nodes
- * that all go several edges in any direction would take many times as long as the rest of an iteration.
- * Such a one is shortened without a look at pairs. Returns the length [m] to which; INFINITY if it is
- * none. */
+/* The length [m] to which a correction is shortened, without a search for pairs, because it throws nodes
+ * farther than the scene is large; INFINITY if it does not. Such a correction is of no use, and a search
+ * among nodes that all go several edges in any direction would take many times as long as the rest of an
+ * iteration. */
 static double thrown_length(const drape_contact *c, double farthest)
 {
     return farthest > c->model->length ? MAX_THROW * c->mean_edge : INFINITY;
-}
-
-/* The fraction that leaves the whole displacement no longer than that. */
-static double shorten_whole(const drape_contact *c, const double *x, const double *y)
-{
-    const double farthest = farthest_throw(c, x, y), longest = thrown_length(c, farthest);
-    return farthest > longest && isfinite(farthest) ? longest / farthest : 1;
 }
 
 double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t, bool again,
@@ -282,18 +272,18 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                              .arrival = DRAPE_KEPT_GAP};
     drape_pair limiting;
     double of_surfaces;
-    const double *before = again && c->looked ? c->before : NULL;
-    c->looked = false;
+    const double *before = again && c->has_before ? c->before : NULL, farthest = farthest_throw(c, x, y);
+    double whole = 1; /* the fraction to which all displacements are shortened */
+    c->has_before = false;
     if (again)
         memcpy(c->before, of_node, (size_t)c->model->node_count * sizeof *c->before);
     for (int32_t i = 0; again && i < c->model->node_count; i++)
         of_node[i] = 1;
     if (of_node) {
         /* Lowers the fractions of nodes that go farther than a path whose candidates can be kept. A
-         * correction throws nodes so far only if it is of no use there; to search each pair on its own
-         * path would take seconds. */
-        const double longest =
-            fmin(thrown_length(c, farthest_throw(c, x, y)), DRAPE_LONGEST_SEARCH * c->mean_edge);
+         * correction throws nodes so far only if it is of no use there; to search each pair on its own path
+         * would take seconds. */
+        const double longest = fmin(thrown_length(c, farthest), DRAPE_LONGEST_SEARCH * c->mean_edge);
         double least = 1, move[3];
         for (int32_t i = 0; i < c->model->node_count; i++) {
             vec3_sub(y + 3 * (size_t)i, x + 3 * (size_t)i, move);
@@ -306,8 +296,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         const double shortened = drape_ranks_least(c->ranks, least);
         if (shortened < 1)
             return shortened;
+    } else if (farthest > thrown_length(c, farthest) && isfinite(farthest)) {
+        whole = thrown_length(c, farthest) / farthest;
     }
-    const double whole = of_node ? 1 : shorten_whole(c, x, y);
     drape_contact_poses(c, t, c->path_pose);
     drape_contact_fill(c, x, c->path_pose, c->from);
     drape_contact_fill(c, y, c->path_pose, c->to);
@@ -317,7 +308,7 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
                                            {.model = c->model, .x = c->to, .pose = c->path_pose}}};
     const double of_features = drape_contact_free_fraction(c, &straight, NULL, &keep, of_node, &of_surfaces,
                                                            before, c->cancel ? *c->cancel : NULL, &limiting);
-    c->looked = of_node && of_features >= 0;
+    c->has_before = of_node && of_features >= 0;
     c->seconds += drape_clock_seconds() - start;
     if (of_features < 0) {
         for (int32_t i = 0; of_node && i < c->model->node_count; i++)
@@ -325,4 +316,56 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         return 0;
     }
     return whole * fmin(of_features, of_surfaces);
+}
+
+/* ---- Within some time ---- */
+
+/* Whether a node could come within the activation distance of the smooth surface of a collider on a straight
+ * path in the coordinates of that: the gap changes by no more than the node moves there. */
+static bool may_touch(const drape_contact *c, int32_t collider, int32_t node, const drape_straight_path *path)
+{
+    const drape_collider *k = &c->model->colliders[collider];
+    const double distance = c->broad.distance[collider];
+    double own[2][3], move[3], gaps = 0;
+    bool keeps = true;
+    for (int end = 0; end < 2; end++) {
+        const drape_configuration *at = &path->end[end];
+        drape_pose_own(&at->pose[collider], at->x + 3 * (size_t)node, own[end]);
+        keeps = keeps && drape_distant_keeps(&c->broad.distant, collider, node, own[end], distance);
+    }
+    for (int end = 0; end < 2 && !keeps; end++)
+        gaps += k->ops->distance(k->values, &k->shape, own[end], NULL, NULL);
+    vec3_sub(own[1], own[0], move);
+    return !keeps && 0.5 * (gaps - vec3_norm(move)) < distance;
+}
+
+static void note(void *user, const drape_pair *pair)
+{
+    bool *found = user;
+    (void)pair;
+    *found = true;
+}
+
+bool drape_contact_may_meet(drape_contact *c, const double *x, const double *v, double t, double seconds)
+{
+    const drape_model *m = c->model;
+    const double start = drape_clock_seconds();
+    const drape_straight_path path = {
+        {{.model = m, .x = c->from, .pose = c->path_pose}, {.model = m, .x = c->to, .pose = c->kink_pose}}};
+    bool meets = false;
+    drape_contact_poses(c, t, c->path_pose);
+    drape_contact_poses(c, t + seconds, c->kink_pose);
+    drape_contact_fill(c, x, c->path_pose, c->from);
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        c->to[i] = x[i] + seconds * v[i];
+    drape_motion_place_pins(c->motion, t + seconds, c->to);
+    drape_contact_fill(c, c->to, c->kink_pose, c->to);
+    for (int32_t k = 0; k < m->collider_count; k++)
+        for (int32_t i = 0; i < m->free_count && !meets && m->colliders[k].ops->smooth; i++)
+            meets =
+                !drape_model_ignores(m, k, m->node_of_free[i]) && may_touch(c, k, m->node_of_free[i], &path);
+    if (!meets)
+        drape_candidates_find(&c->broad, &path, 0, true, NULL, note, &meets);
+    c->seconds += drape_clock_seconds() - start;
+    return meets;
 }

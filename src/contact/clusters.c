@@ -29,7 +29,7 @@ static int32_t cloth_of_face(const drape_model *m, int32_t face)
     return drape_model_cloth_of(m, m->triangle[3 * (size_t)face]);
 }
 
-/* The branches of a tree of faces down to clusters. */
+/* Copies the branches of a tree of faces down to those whose faces make a cluster. */
 static void cut(builder *b, int32_t from)
 {
     drape_clusters *s = b->of;
@@ -50,8 +50,6 @@ static void cut(builder *b, int32_t from)
     s->branches[self].second = s->branch_count;
     cut(b, branch->second);
 }
-
-/* ---- Owners ---- */
 
 static void claim(builder *b, drape_element_kind kind, int32_t element, int32_t cluster)
 {
@@ -131,8 +129,8 @@ static drape_status build(drape_arena *arena, drape_arena *temporary, const doub
     s->branches = drape_arena_resize(arena, s->branches, (size_t)s->branch_count, sizeof *s->branches);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    /* The first cluster with a face that has them owns a node or an edge; those without faces belong to
-     * the last one. */
+    /* A node or an edge belongs to the first cluster that has one of its faces, or to the last cluster if it
+     * has no face. */
     for (int32_t i = 0; i < m->triangle_count; i++) {
         const int32_t face = faces.order[i], *n = m->triangle + 3 * (size_t)face,
                       cluster = b.owner[DRAPE_ELEMENT_FACE][face];

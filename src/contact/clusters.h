@@ -18,7 +18,8 @@ typedef enum drape_element_kind {
     DRAPE_ELEMENT_KINDS
 } drape_element_kind;
 
-/* Groups of LANES elements, the last one filled up with -1. */
+/* Some neighbouring faces, and the nodes and edges that belong to them, in groups of LANES elements, the last
+ * of which is filled up with -1. */
 typedef struct drape_cluster {
     int32_t first_group[DRAPE_ELEMENT_KINDS], groups[DRAPE_ELEMENT_KINDS];
     int32_t first_point, points; /* the nodes of all its elements */
@@ -42,9 +43,9 @@ typedef struct drape_clusters {
     int32_t *faces_of_edge; /* (edge_count) how many faces have it */
 } drape_clusters;
 
-/* The pairs of branches that follow a pair, the first not later than the second, and neither within the
- * other unless they are the same: up to four, so that from the root with itself on each pair of leaves is
- * reached once. Returns their number, 0 for two leaves. */
+/* The pairs of children of two branches a <= b, neither of which is within the other unless they are the
+ * same: up to four, so that from the root with itself each pair of leaves is reached once. Returns their
+ * number, 0 for two leaves. */
 static inline int drape_clusters_descend(const drape_clusters *clusters, int32_t a, int32_t b,
                                          int32_t pair[4][2])
 {

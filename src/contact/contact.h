@@ -85,7 +85,7 @@ typedef enum drape_contact_derivatives {
                                differs from it only by restitution */
     DRAPE_CONTACT_VELOCITY,    /* dg/dv */
     DRAPE_CONTACT_GAUSS_NEWTON /* a positive semidefinite approximation: the Gauss-Newton part of the Hessians
-                                  of the energy (contact/force.h), and symmetric upper bounds of the weight
+                                  of the energy (contact/law.h), and symmetric upper bounds of the weight
                                   dg/dv of restitution and friction (contact/restitution.h,
                                   contact/friction.h) */
 } drape_contact_derivatives;
@@ -137,7 +137,7 @@ void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The part of it that is the same on all ranks: the stiffness and the activation distances. What was read
  * is of a step that has not begun. */
-void drape_contact_archive_press(drape_contact *contact, drape_archive *a);
+void drape_contact_archive_stiffness(drape_contact *contact, drape_archive *a);
 
 /* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
  * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#define STALE   0.25                /* of its gap: a node that has moved by more is looked at again */
+#define STALE   0.25 /* share of its gap by which a node may move before it is evaluated again */
 #define CLUSTER DRAPE_CLUSTER_FACES /* nodes of one */
 
 drape_status drape_distant_create(drape_arena *arena, const drape_model *model, const drape_path_bvh *faces,
@@ -16,7 +16,7 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
 {
     const size_t nodes = (size_t)model->node_count, count = (size_t)model->collider_count * nodes;
     *out = (drape_distant){.model = model,
-                           .seen = drape_arena_take(arena, count, sizeof *out->seen),
+                           .known = drape_arena_take(arena, count, sizeof *out->known),
                            .order = drape_arena_take(arena, nodes, sizeof *out->order),
                            .balls =
                                drape_arena_take(arena, (size_t)((model->node_count + CLUSTER - 1) / CLUSTER),
@@ -25,7 +25,7 @@ drape_status drape_distant_create(drape_arena *arena, const drape_model *model, 
     if (drape_arena_status(arena))
         return drape_arena_status(arena);
     for (size_t i = 0; i < count; i++)
-        out->seen[i].gap = -INFINITY;
+        out->known[i].gap = -INFINITY;
     /* Nodes in the order in which faces have them first, then those that no face has. */
     int32_t ordered = 0;
     for (int32_t f = 0; f < faces->count; f++)
@@ -53,7 +53,7 @@ void drape_distant_fit(drape_distant *distant, const double *x, const double *y)
         ball->radius = 0;
         for (int end = 0; end < 2; end++) {
             double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-            double half[3], sum = 0; /* not finite where a position is not: no such ball is beyond */
+            double half[3], sum = 0; /* not finite if a position is not: such a ball is not beyond anything */
             for (int32_t i = first; i < first + CLUSTER && i < nodes; i++)
                 for (int k = 0; k < 3; k++) {
                     const double at = ends[end][3 * (size_t)distant->order[i] + (size_t)k];
@@ -71,7 +71,8 @@ void drape_distant_fit(drape_distant *distant, const double *x, const double *y)
     }
 }
 
-/* Whether a ball that contains those of both ends, and so the paths of all nodes, is beyond. */
+/* Whether a ball that contains the balls of both ends, and so the paths of all nodes of the cluster, is
+ * farther than the gap from a collider. */
 static bool is_beyond(const drape_distant *d, const drape_node_ball *ball, int32_t collider,
                       const drape_collider_pose *const pose[2], double gap)
 {
@@ -91,11 +92,11 @@ void drape_distant_mark(const drape_distant *distant, int32_t collider,
                         const drape_collider_pose *const pose[2], double gap, bool *marked)
 {
     const drape_collider *of = &distant->model->colliders[collider];
-    const bool looks = of->ops->smooth && of->frames.frame_count == 0;
+    const bool rigid = of->ops->smooth && of->frames.frame_count == 0;
     const int32_t nodes = distant->model->node_count;
     for (int32_t first = 0; first < nodes; first += CLUSTER) {
         const bool beyond =
-            looks && is_beyond(distant, &distant->balls[first / CLUSTER], collider, pose, gap);
+            rigid && is_beyond(distant, &distant->balls[first / CLUSTER], collider, pose, gap);
         for (int32_t i = first; i < first + CLUSTER && i < nodes; i++)
             marked[distant->order[i]] = !beyond;
     }
@@ -114,13 +115,13 @@ void drape_distant_update(drape_distant *distant, const double *x, const drape_c
             continue;
         for (int32_t i = 0; i < m->free_count; i++) {
             const int32_t node = m->node_of_free[i];
-            drape_sighting *seen = &distant->seen[(size_t)k * (size_t)m->node_count + (size_t)node];
+            drape_known_gap *known = &distant->known[(size_t)k * (size_t)m->node_count + (size_t)node];
             double own[3];
             drape_pose_own(&pose[k], x + 3 * (size_t)node, own);
-            if (drape_distant_keeps(distant, k, node, own, (1 - STALE) * seen->gap))
+            if (drape_distant_keeps(distant, k, node, own, (1 - STALE) * known->gap))
                 continue;
             const double gap = collider->ops->distance(collider->values, &collider->shape, own, NULL, NULL);
-            *seen = (drape_sighting){.own = {own[0], own[1], own[2]}, .gap = gap - rounding};
+            *known = (drape_known_gap){.own = {own[0], own[1], own[2]}, .gap = gap - rounding};
         }
     }
 }

@@ -1,7 +1,7 @@
 /*
- * exempt.h: pairs that contact does not hold, for whoever says so from outside (realtime/room.h): they have
- * the bounded barrier (barrier.h), which pushes out with a pressure of no more than the scene's, limit no
- * step, and are not checked.
+ * exempt.h: pairs that contact does not hold. A module outside (realtime/room.h) says which. Exempt pairs
+ * have the bounded barrier (barrier.h), which pushes out with no more than the scene's pressure; they limit
+ * no step, and are not checked.
  */
 #ifndef DRAPE_CONTACT_EXEMPT_H
 #define DRAPE_CONTACT_EXEMPT_H
@@ -10,22 +10,22 @@
 #include "contact/pair.h"
 
 typedef struct drape_exempt {
-    int32_t count; /* exempt nodes of the cloth; 0: all pairs are held, and no question is asked */
+    int32_t count; /* exempt nodes of the cloth; 0: all pairs are held, and no function is called */
     /* The factor of the pressure on a pair; 0: it is held. */
     double (*factor)(const struct drape_exempt *exempt, const drape_pair *pair);
-    /* Whether a pair that is exempt acts itself; if not, its nodes have contacts of `add`. */
+    /* Whether an exempt pair is a contact itself; if not, `add` has the contacts of its nodes. */
     bool (*acts)(const struct drape_exempt *exempt, const drape_pair *pair);
     /* Whether any of these nodes is exempt at a collider; -1 stands for no node. */
     bool (*has)(const struct drape_exempt *exempt, int32_t collider, const int32_t *node, int nodes);
-    /* Adds the contacts of exempt nodes that no pair stands for, to the active set of a configuration.
+    /* Adds the contacts of exempt nodes that are not those of pairs to the active set of a configuration.
      * Errors: DRAPE_E_MEMORY. */
     drape_status (*add)(drape_contact *contact, const drape_configuration *at);
-    /* A step begins, at a point where contact has been updated: what is exempt may change, after which this
-     * updates it again. Errors: DRAPE_E_MEMORY. */
+    /* Called when a step begins, where contact has been updated. It may change what is exempt, and then
+     * updates contact again. Errors: DRAPE_E_MEMORY. */
     drape_status (*begin)(drape_contact *contact, const drape_contact_at *at);
 } drape_exempt;
 
-/* exempt NULL: nobody says anything. */
+/* exempt NULL: no pair is exempt. */
 static inline double drape_exempt_factor(const drape_exempt *exempt, const drape_pair *pair)
 {
     return exempt && exempt->count > 0 ? exempt->factor(exempt, pair) : 0;

@@ -37,7 +37,7 @@ static double length_of(double x, double y)
     return sqrt(x * x + y * y);
 }
 
-/* Axes of the plane, from the sum of the normals of faces. False: it has none. */
+/* Axes of the plane, from the sum of the normals of faces; false if that is 0. */
 static bool find_axes(const drape_model *m, int32_t cloth, const double *rest, double axis[3][3])
 {
     double a[3], b[3], c[3], normal[3] = {0};
@@ -100,8 +100,8 @@ static void measure_hull(place *places, int32_t count, place *hull, double *area
     }
 }
 
-/* Whether the faces cover their convex hull once, but for rounding: they have its area, and no boundary
- * but its own. */
+/* Whether the faces cover their convex hull once: their area is that of the hull, and the length of their
+ * boundary is its perimeter, but for rounding. */
 static bool is_convex(builder *b, int32_t cloth, double length)
 {
     const drape_model *m = b->model;
@@ -133,7 +133,7 @@ static bool is_convex(builder *b, int32_t cloth, double length)
            fabs(perimeter - hull_perimeter) <= DRAPE_CLOSEST_ROUNDING * length;
 }
 
-/* Places a sheet in its plane, beside those before. */
+/* Places a sheet in its plane, beside the sheets before it. */
 static void lay_flat(builder *b, int32_t cloth, const double *rest, double *beside)
 {
     const drape_model *m = b->model;
@@ -218,7 +218,7 @@ static void set_leaf(builder *b, int32_t branch)
 
 /* ---- Pairs of branches ---- */
 
-/* Lists the clusters that touch a rectangle, or are apart by rounding; 0: they are too many. */
+/* Lists the clusters that touch a rectangle, but for rounding. Returns their number; 0: they are too many. */
 static int32_t list_window(const drape_flat *s, const drape_flat_area *within, int32_t *window)
 {
     const drape_clusters *c = s->clusters;
@@ -240,8 +240,8 @@ static int32_t list_window(const drape_flat *s, const drape_flat_area *within, i
     return count;
 }
 
-/* The pairs from two branches on. The lists are NULL while their lengths are counted, in first_pair[a +
- * 2]. */
+/* Lists the pairs from two branches on. As long as the lists are NULL, counts the pairs of each first branch
+ * a in first_pair[a + 2], and the entries of the windows. */
 static void find_pairs(builder *b, int32_t first, int32_t second)
 {
     drape_flat *s = b->out;
@@ -416,12 +416,13 @@ bool drape_flat_keeps_apart(drape_flat *s, int32_t a, int32_t b, const drape_fla
         for (int column = 0; column < 2; column++)
             vec3_add_scaled(1, s->sum[which][column], sum[column]);
     }
-    /* c for pieces that are at least `height` apart at rest. Half of their distance, if that is what they
-     * must keep, grows by half of what is beyond. */
+    /* The bound c for pieces that are at least `height` apart at rest. If they must keep half of their
+     * distance at rest, c must be at least one half, so that it holds for pieces that are farther apart,
+     * too. */
     const double half = 0.5 * height + want->slack;
     const double wanted = (fmin(want->reach, half) + want->rounding) / height;
     const double share = half < want->reach ? fmax(wanted, 0.5) : wanted;
-    /* Orthonormal columns near those of a sum of gradients. */
+    /* A has orthonormal columns near those of the sum of the gradients. */
     double plus[3], minus[3];
     const double first = vec3_norm(sum[0]), second = vec3_norm(sum[1]);
     for (int k = 0; k < 3; k++) {

@@ -1,9 +1,9 @@
 /*
- * flat.h: shows that neighbouring clusters of cloth are apart from how the cloth between them is deformed,
- * where boxes cannot, because they overlap. Of cloth that is a flat, convex sheet at rest, the straight line
- * between two points of the rest shape lies in the sheet. With the gradient F (3 x 2) of the faces that it
- * crosses, and any A (3 x 2) of norm 1, the points X, Y of the rest shape are at least c |X - Y| apart if
- * the symmetric part of A^T F has no eigenvalue below c on these faces:
+ * flat.h: shows that neighbouring clusters of cloth, whose boxes overlap, are apart because the cloth between
+ * them is little deformed. If a sheet is flat and convex at rest, the straight line between two points of the
+ * rest shape lies in the sheet. With the gradient F (3 x 2) of the faces that the line crosses, and any A (3
+ * x 2) of norm 1, the points X, Y of the rest shape are at least c |X - Y| apart if the symmetric part of A^T
+ * F has no eigenvalue below c on these faces:
  *
  *     |x - y| >= (X - Y)^T A^T (x - y) / |X - Y| = mean of (X - Y)^T A^T F (X - Y) / |X - Y| >= c |X - Y|.
  *
@@ -26,23 +26,22 @@ typedef struct drape_flat_area {
     double low[2], high[2];
 } drape_flat_area;
 
-/* Clusters of the largest part of a sheet that is looked at as one: larger ones are seldom flat enough. */
+/* Clusters in the largest part of a sheet that is tested as a whole: larger parts are seldom flat enough. */
 #define DRAPE_FLAT_WINDOW 16
 
 typedef struct drape_flat {
     const drape_clusters *clusters;
-    double
-        *inverse;   /* (groups of faces x 4 x LANES) of the edges of each face at rest; copies of one in lanes
-                        without a face */
-    double *height; /* [m] (clusters) the least of its faces at rest */
+    double *inverse; /* (groups of faces x 4 x LANES) of the matrix of two edges of each face at rest; a lane
+                        without a face has a copy of another one */
+    double *height;  /* [m] (clusters) the least of its faces at rest */
     drape_flat_area *area; /* (branches) at rest, in the plane of the sheet; sheets lie side by side */
     int32_t *cloth;        /* (branches) the sheet that all of its faces are of; -1: there is none */
     int32_t *leaves;       /* (branches) */
-    /* Pairs of branches of one sheet that touch at rest, by the first one, and the clusters of all faces
-     * that a line between them may cross. */
+    /* Pairs of branches of one sheet that touch at rest, listed at the first branch, and the clusters of all
+     * faces that a line between them may cross. */
     int32_t *first_pair; /* (branches + 2) */
     int32_t *other;      /* (pairs) the second branch */
-    int64_t *at; /* (pairs) where the list of its clusters begins: their number, then they themselves */
+    int64_t *at; /* (pairs) index in `window` of the number of its clusters, which the clusters follow */
     int32_t *window;
     drape_gradients *gradients; /* (groups of faces) */
     double (*sum)[2][3];        /* (clusters) of gradients of both ends, by column and axis */
@@ -53,16 +52,17 @@ typedef struct drape_flat {
 drape_status drape_flat_create(drape_arena *arena, const drape_clusters *clusters, const double *rest,
                                drape_flat *out);
 
-/* What is asked: pieces on the path from x to y (y NULL: at x), in the search of this number > 0, whose
- * distance is to be at least the lesser of `reach` and half of their distance at rest plus `slack`. */
+/* Whether pieces keep a distance on the path from x to y (y NULL: at x): the lesser of `reach`, and half of
+ * their distance at rest plus `slack`. search: the number of the search, > 0, by which it is known what is
+ * fitted. */
 typedef struct drape_flat_query {
     const double *x, *y;
     double reach, slack, rounding; /* [m] */
     int64_t search;
 } drape_flat_query;
 
-/* Whether it is certain that all pieces without a common node, one of each branch, are so far apart. The
- * branches are two that drape_clusters_descend leads to. */
+/* Whether all pairs of pieces without a common node, one piece of each branch, surely keep their distance. a,
+ * b: a pair that drape_clusters_descend has returned, or the root twice. */
 bool drape_flat_keeps_apart(drape_flat *flat, int32_t a, int32_t b, const drape_flat_query *want);
 
 #endif

@@ -28,7 +28,7 @@ static slip slip_of(const drape_gap *gap, const drape_contact_law *law, double v
 }
 
 /* d(a u_t) for a change du_t */
-static void turn(const slip *s, const double *du, double *out)
+static void differentiate(const slip *s, const double *du, double *out)
 {
     double along = s->b * vec3_dot(s->tangent, du);
     for (int k = 0; k < 3; k++)
@@ -52,7 +52,7 @@ void drape_friction_force(const drape_gap *gap, const drape_contact_law *law, do
         double du[3] = {0}, df[3];
         du[j % 3] = gap->closest.c[j / 3];
         project_out(gap->closest.normal, du);
-        turn(&s, du, df);
+        differentiate(&s, du, df);
         for (int i = 0; i < d; i++)
             dgdv[D * i + j] = gap->closest.c[i / 3] * scale * df[i % 3];
     }
@@ -97,7 +97,7 @@ void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *
         project_out(gap->closest.normal, du);
         vec3_add_scaled(-normal_speed, dn, du);
         vec3_add_scaled(-vec3_dot(s.u, dn), gap->closest.normal, du);
-        turn(&s, du, df);
+        differentiate(&s, du, df);
         for (int i = 0; i < d; i++)
             dg[D * i + j] += scale * (s.a * s.tangent[i % 3] * derivatives->closest.c[i / 3][j] +
                                       gap->closest.c[i / 3] * df[i % 3]);

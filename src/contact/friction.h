@@ -16,13 +16,13 @@ void drape_friction_force(const drape_gap *gap, const drape_contact_law *law, do
                           double *g, double *dgdv);
 
 /* A symmetric upper bound of dg/dv (in the Loewner order): c_i c_j mu lambda f(y)/|u_t| (I - n n'). Unlike
- * dg/dv it is as stiff along the sliding velocity as across it, so that a step computed with it does not
- * reverse the friction. */
+ * dg/dv the bound is as stiff along the sliding velocity as across it, so that a step that is computed with
+ * it does not reverse the friction. */
 void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *dgdv);
 
-/* Add to dg (12 x 12), for friction that is not lagged, the derivatives for a change dlambda (12) of the
- * normal force, and those of c and the normal by x. */
+/* Derivatives of friction that is not lagged, added to dg (12 x 12): for a change dlambda (12) of the normal
+ * force, and by x through c and the normal. */
 void drape_friction_add_normal(const drape_gap *gap, const drape_contact_law *law, const double *dlambda,
                                double v[4][3], double *dg);
 void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,

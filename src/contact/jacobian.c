@@ -1,6 +1,6 @@
 /* jacobian.c: derivatives of the forces of the active set, and the blocks of a pattern that they need. See
  * contact.h. */
-#include "contact/parts.h"
+#include "contact/contact_parts.h"
 
 #include "base/clock.h"
 #include "base/list.h"
@@ -16,7 +16,7 @@ static int32_t free_of(const drape_model *m, int32_t point)
     return point >= 0 && point < m->node_count ? m->free_of_node[point] : -1;
 }
 
-/* Adds share h. */
+/* Adds share h to the blocks of the free nodes of a contact. */
 static void add_blocks(const drape_contact *c, const drape_active_contact *contact, double share,
                        const double *h, const drape_pattern *pattern, double *values)
 {
@@ -36,7 +36,7 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
         }
 }
 
-/* -dN/dg if only the gap changes, and its rate with it. */
+/* -dN/dgap if only the gap changes, and with it its rate; bound: with the upper bound of restitution. */
 static double tangent_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
                                 double v[4][3], bool bound)
 {
@@ -47,8 +47,8 @@ static double tangent_stiffness(const drape_gap *gap, const drape_contact_law *l
                  : barrier * (1 - normal.share) + weight * normal.lambda * normal.slope;
 }
 
-/* The normal stiffness that a contact has in the Jacobian, less its tangent; bound: of the upper bound of
- * restitution. */
+/* The normal stiffness that a contact has in the Jacobian, the secant of its predicted force, less the
+ * tangent. */
 static double excess_stiffness(const drape_contact *c, const drape_active_contact *contact,
                                const drape_contact_law *law, double weight, bool bound)
 {
@@ -81,8 +81,8 @@ static void add_friction(const request *want, const drape_active_contact *contac
             h[D * i + j] += want->weight * dgdv[D * i + j];
 }
 
-/* Adds how friction that is not lagged changes with its normal force and, unless derivatives and by_x are
- * NULL, with the place of contact. */
+/* Adds the derivatives of friction that is not lagged by its normal force and, unless derivatives and by_x
+ * are NULL, by the place of contact. */
 static void add_changes_of_friction(const drape_gap *gap, const drape_contact_law *law, double weight,
                                     const drape_normal *normal, const drape_gap_derivatives *derivatives,
                                     const drape_normal_derivatives *by_x, double excess, double v[4][3],
@@ -129,7 +129,8 @@ static void add_dissipative(const drape_contact *c, const request *want, const d
                                 excess, v, h);
 }
 
-/* A round feature that turns has another velocity wherever the normal leads: dv = arm G dn at its points. */
+/* Adds what follows from the velocity of the surface around a round feature that turns: it changes with the
+ * normal, by dv = arm G dn at the points of the feature. */
 static void add_roll(const drape_contact *c, const drape_active_contact *contact,
                      const drape_gap_derivatives *derivatives, const double *hv, double *h)
 {
@@ -143,8 +144,8 @@ static void add_roll(const drape_contact *c, const drape_active_contact *contact
                         hv[D * i + b] * arm * gradient[3 * (b % 3) + k] * derivatives->closest.normal[k][j];
 }
 
-/* A surface that turns has another velocity wherever a node is: adds what this changes of forces with dg/dv =
- * hv, the relative velocity being v - V(x). derivatives: NULL where the contact is fixed. */
+/* Adds what follows from the velocity V(x) of a surface that turns: forces with dg/dv = hv depend on x
+ * through the relative velocity v - V(x). derivatives: NULL if the place of contact is fixed. */
 static void add_spin(const drape_contact *c, const drape_active_contact *contact,
                      const drape_gap_derivatives *derivatives, const double *hv, double *h)
 {
@@ -210,11 +211,11 @@ static void add_derivatives(const drape_contact *c, const request *want, double 
         drape_gap_derivatives derivatives;
         if (by_x) {
             drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
-            drape_contact_hessian(&contact->gap, &derivatives, &law, h);
+            drape_law_hessian(&contact->gap, &derivatives, &law, h);
         } else if (want->which == DRAPE_CONTACT_VELOCITY) {
             memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
         } else {
-            drape_contact_gauss_newton(&contact->gap, &law, h);
+            drape_law_gauss_newton(&contact->gap, &law, h);
         }
         const double excess = want->which == DRAPE_CONTACT_VELOCITY
                                   ? 0
@@ -336,7 +337,7 @@ void drape_contact_predict(drape_contact *c, const double *p, double weight, dou
     for (int32_t i = 0; p && i < c->active.count; i++)
         if (!drape_predictions_add(next, &c->active.contacts[i],
                                    predict(c, &c->active.contacts[i], p, weight, mass_weight)))
-            break; /* the tangent is used where there is no memory */
+            break; /* without memory for it, a contact has its tangent */
     const drape_predictions swap = *now;
     *now = *next;
     *next = swap;
@@ -408,9 +409,10 @@ int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
     const drape_straight_path here = {{now, now}};
     drape_distances away;
     c->coupling_count = 0;
-    /* Pairs that are half as far from becoming active as candidates have their blocks when a pattern is made:
-     * those of others stay 0, and cost more in each factorisation of a pile than the patterns that they save.
-     * They come from the candidates if these include them all: a pattern depends on the positions alone. */
+    /* A pattern has the blocks of all pairs within half of the distance up to which pairs are candidates.
+     * Blocks of more pairs would stay 0, and cost more in each factorisation of a pile than the patterns that
+     * they save. The pairs are taken from the candidates only if these contain all of them: a pattern depends
+     * on the positions alone. */
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (candidates &&
         drape_candidates_farthest(candidates, &away) + 0.5 * list.margin <= candidates->margin) {

@@ -8,7 +8,7 @@
 
 /* of |e1|^2 |e2|^2 at rest: sin^2 below which edges are mollified (Li et al. 2020) */
 #define PARALLEL_WIDTH 1e-3
-#define UNTANGLED      0.1 /* of the shortest edge: activation distance of pieces that rest in each other */
+#define UNTANGLED      0.1 /* activation distance of pieces that rest in each other, in their shortest edge */
 
 typedef void find_closest(double x[4][3], drape_closest *at);
 
@@ -138,8 +138,8 @@ static double largest(double x[4][3])
     return most;
 }
 
-/* For a sharp feature at distance 0, the closest points give no direction. Its normal is then the one
- * across both pieces, out of the collider, and fixed. */
+/* The normal at a sharp feature at distance 0, where the closest points give no direction: across both pieces
+ * and out of the collider. It does not change with the points. */
 static void touching_normal(const drape_pair *pair, const drape_configuration *at, double x[4][3],
                             double normal[3])
 {
@@ -193,9 +193,9 @@ bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, 
     return are_apart(pair->kind, x, gap + pair->radius);
 }
 
-/* Where a rest shape passes through itself or another one, half of the rest distance would be nothing,
- * so a scene that is untangled bounds it below: by the sizes of the pieces within one sheet, whose neighbours
- * are as far apart as that; other sheets keep the whole distance. */
+/* A lower bound of the activation distance. Where a rest shape passes through itself or another one, half of
+ * the distance at rest would be 0. So in a scene that is untangled two pieces of one sheet have at least a
+ * share of the shortest of their edges, as neighbours have, and pieces of two sheets the whole distance. */
 static double least_activation(const drape_pair *pair, const drape_configuration *rest)
 {
     const drape_model *m = rest->model;
@@ -272,25 +272,6 @@ void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const 
 
 /* ---- Continuous collision detection ---- */
 
-/* The largest rate at which the two pieces can approach each other, per step fraction, without their common
- * motion. */
-static double approach_speed(drape_pair_kind kind, double p[4][3])
-{
-    double mean[3] = {0}, first = 0, second = 0;
-    const int split = split_of(kind);
-    for (int a = 0; a < 4; a++)
-        vec3_add_scaled(0.25, p[a], mean);
-    for (int a = 0; a < 4; a++) {
-        vec3_add_scaled(-1, mean, p[a]);
-        double speed = vec3_norm(p[a]);
-        if (a < split)
-            first = fmax(first, speed);
-        else
-            second = fmax(second, speed);
-    }
-    return first + second;
-}
-
 /* The points of a pair and their displacements. If its collider turns, they are seen from there: its own
  * points rest, and the others turn about it. */
 typedef struct pair_path {
@@ -315,32 +296,48 @@ static double gap_at(const drape_pair *pair, const pair_path *path, double t, do
     return closest.distance - radius;
 }
 
-/* How far the first piece is ahead of the second at a step fraction along the normal of an earlier one, at
- * which they were as far apart along it: on a straight path they are never nearer in between than at both. */
-static double lead_at(const drape_pair *pair, const pair_path *path, const double normal[3], double t)
+/* By how much the first piece is ahead of the second along an axis on which the points of the pair have these
+ * coordinates. */
+static double lead_of(int split, const double at[4])
 {
-    const int split = split_of(pair->kind);
     double first = INFINITY, second = -INFINITY;
-    for (int a = 0; a < 4; a++) {
-        const double at = vec3_dot(normal, path->x[a]) + t * vec3_dot(normal, path->p[a]);
+    for (int a = 0; a < 4; a++)
         if (a < split)
-            first = at < first ? at : first;
+            first = at[a] < first ? at[a] : first;
         else
-            second = at > second ? at : second;
-    }
+            second = at[a] > second ? at[a] : second;
     return first - second;
 }
 
-/* Of straight displacements the common part is taken out, too. */
-static double speed_of(const drape_pair *pair, pair_path *path)
+/* By how much the first piece is ahead of the second along a normal at a step fraction t. If the normal is
+ * that of an earlier fraction, the pieces of a straight path are never nearer between the two fractions than
+ * at one of them. */
+static double lead_at(const drape_pair *pair, const pair_path *path, const double normal[3], double t)
 {
-    double largest = 0;
-    if (!path->swing)
-        return approach_speed(pair->kind, path->p);
+    double at[4];
     for (int a = 0; a < 4; a++)
+        at[a] = vec3_dot(normal, path->x[a]) + t * vec3_dot(normal, path->p[a]);
+    return lead_of(split_of(pair->kind), at);
+}
+
+/* The largest rate, per step fraction, at which the two pieces can approach each other. The common part of
+ * straight displacements is taken out of the path. */
+static double approach_speed(const drape_pair *pair, pair_path *path)
+{
+    double mean[3] = {0}, largest[2] = {0};
+    for (int a = 0; a < 4 && path->swing; a++)
         if (!path->rests[a])
-            largest = fmax(largest, drape_swing_speed(path->swing, path->x[a], path->p[a]));
-    return largest;
+            largest[0] = fmax(largest[0], drape_swing_speed(path->swing, path->x[a], path->p[a]));
+    if (path->swing)
+        return largest[0];
+    for (int a = 0; a < 4; a++)
+        vec3_add_scaled(0.25, path->p[a], mean);
+    for (int a = 0; a < 4; a++) {
+        const int second = a >= split_of(pair->kind);
+        vec3_add_scaled(-1, mean, path->p[a]);
+        largest[second] = fmax(largest[second], vec3_norm(path->p[a]));
+    }
+    return largest[0] + largest[1];
 }
 
 double drape_pair_step_fraction(const drape_pair *pair, const double *from, const double *to,
@@ -355,7 +352,7 @@ double drape_pair_step_fraction(const drape_pair *pair, const double *from, cons
         vec3_sub(y[a], path.x[a], path.p[a]);
         path.rests[a] = turns && pair->node[a] >= swings->nodes;
     }
-    const double speed = speed_of(pair, &path), least = drape_pair_least_gap(pair, keep->rounding);
+    const double speed = approach_speed(pair, &path), least = drape_pair_least_gap(pair, keep->rounding);
     double normal[3], gap = gap_at(pair, &path, 0, radius, normal);
     if (keep->core && !drape_gap_has_side(gap, keep->rounding)) {
         gap += radius;
@@ -393,26 +390,18 @@ static void axis_between(int split, double x[4][3], double axis[3])
                              : 0.5 * ((x[0][k] + x[1][k]) - (x[2][k] + x[3][k]));
 }
 
-/* How far the first piece is ahead of the second along an axis, times the length of the axis. */
-static double lead_along(int split, const double axis[3], double x[4][3])
+/* The least lead along an axis, times the length of the axis, on a path with these ends: the difference of
+ * two points along an axis is linear on the path, so it is least at an end. */
+static double least_lead(int split, const double axis[3], double x[2][4][3], int ends)
 {
-    double first = INFINITY, second = -INFINITY;
-    for (int a = 0; a < 4; a++) {
-        const double at = vec3_dot(axis, x[a]);
-        if (a < split)
-            first = at < first ? at : first;
-        else
-            second = at > second ? at : second;
+    double least = INFINITY, at[4];
+    for (int end = 0; end < ends; end++) {
+        for (int a = 0; a < 4; a++)
+            at[a] = vec3_dot(axis, x[end][a]);
+        const double lead = lead_of(split, at);
+        least = lead < least ? lead : least;
     }
-    return first - second;
-}
-
-/* The same over a path with these ends (y NULL: there is one): the difference of two points along an axis is
- * linear on it, so it is least at an end. */
-static double least_lead(int split, const double axis[3], double at[2][4][3], const double *y)
-{
-    const double first = lead_along(split, axis, at[0]), last = y ? lead_along(split, axis, at[1]) : first;
-    return last < first ? last : first;
+    return least;
 }
 
 double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y)
@@ -424,7 +413,7 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
         gather_relative(pair, x, y, at[1]);
     for (int end = 0; end < ends; end++) {
         axis_between(split, at[end], axis);
-        const double least = least_lead(split, axis, at, y), length = vec3_norm(axis);
+        const double least = least_lead(split, axis, at, ends), length = vec3_norm(axis);
         if (length > 0 && least / length > bound)
             bound = least / length;
     }
@@ -440,7 +429,7 @@ bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double 
         gather_relative(pair, x, y, at[1]);
     for (int end = 0; end < ends; end++) {
         axis_between(split, at[end], axis);
-        const double least = least_lead(split, axis, at, y);
+        const double least = least_lead(split, axis, at, ends);
         if (least > 0 && least * least >= distance * distance * vec3_dot(axis, axis))
             return true;
     }

@@ -28,17 +28,17 @@ typedef struct drape_pair {
     int32_t rank[3];      /* by which candidates are sorted: stage of the search, piece, place of the other */
 } drape_pair;
 
-/* The least gap [m] that a pair may have at the end of a step: a share of its activation distance and, if
- * that is larger, of the coordinates, whose rounding would decide on which side a smaller gap is. Cloth
- * that is nearly as close as that at rest may approach to half of its activation distance. */
+/* The least gap [m] that a pair may have at the end of a step: a share of its activation distance or, if that
+ * is larger, the rounding of gaps, which would decide on which side a smaller gap is. A pair whose activation
+ * distance is nearly as small, because it is close at rest, may approach to half of that distance. */
 #define DRAPE_LEAST_GAP 1e-3 /* of the activation distance */
 static inline double drape_pair_least_gap(const drape_pair *pair, double rounding)
 {
     return fmin(fmax(DRAPE_LEAST_GAP * pair->distance, rounding), 0.5 * pair->distance);
 }
 
-/* A gap below this share of the rounding has no side that it could be kept on. It is far below the share of
- * the least gap that is kept on paths, so only pairs that begin there are exempt: not those that were
+/* A gap below this share of the rounding has no side that it could be kept on. The share is far below that of
+ * the least gap which is kept on paths: only pairs that begin so near have no side, not those that steps have
  * accepted, even if the rounding has become larger since. */
 #define DRAPE_NO_SIDE 0.1
 static inline bool drape_gap_has_side(double gap, double rounding)
@@ -46,25 +46,28 @@ static inline bool drape_gap_has_side(double gap, double rounding)
     return gap >= DRAPE_NO_SIDE * rounding && gap > 0;
 }
 
-/* Half: of the least gap, or of a smaller one at the beginning of a step, that a path must keep; of what a
- * gap has above the least that is kept when a Newton iterate is cut short; and of the activation distance,
- * where a pair that comes from beyond it is stopped then: halved from afar, its gap would reach the
- * barrier only after many iterations, in which it holds up all other pairs. */
+/* One half is the share of the least gap, or of a smaller one at the beginning of a step, that a path must
+ * keep. When a Newton iterate is cut short, it is also the share that is kept of what a gap has above the
+ * least one, and the share of the activation distance at which a pair that comes from beyond it is stopped:
+ * halved from afar, the gap would reach the barrier only after many iterations, in which the pair holds up
+ * all others. */
 #define DRAPE_KEPT_GAP 0.5
 
-/* A march along a path takes at once this share of what is certainly free, and ends within the rest of it.
- * After so many steps the fraction that it has reached is safe, even if it is not the largest. */
+/* Each advance along a path (conservative advancement) is this share of the length that is certainly free,
+ * and the search ends when the gap is within the rest of that share of its aim. After the maximum of advances
+ * the fraction that was reached is safe, even if it is not the largest. */
 #define DRAPE_ADVANCE      0.9
 #define DRAPE_MAX_ADVANCES 1000
 
 /* How much of its gap a pair must keep on a path. */
 typedef struct drape_keep {
     double rounding; /* [m] of gaps */
-    double least;    /* share of the least gap, for a pair that begins above it, */
-    double above;    /* and share of what its gap has more than that */
+    double least;    /* a pair that begins above the least gap keeps this share of the least gap, */
+    double above;    /* and this share of what its gap has above that */
     double below;    /* share of the gap of a pair that begins below the least gap */
-    double arrival; /* share of the activation distance to which a pair from beyond it may come; 0: `above` */
-    bool core;      /* a pair that begins within its radius keeps its distance instead of its gap */
+    double
+        arrival; /* share of the activation distance to which a pair from beyond may come; 0: as by `above` */
+    bool core;   /* a pair that begins within its radius keeps its distance instead of its gap */
 } drape_keep;
 
 static inline double drape_keep_gap(const drape_keep *keep, double least, double gap, double distance)
@@ -79,8 +82,8 @@ typedef struct drape_configuration {
     const double *x;                 /* (points x 3) */
     const drape_collider_pose *pose; /* (collider_count) */
     const drape_collider *const
-        *body; /* (collider_count) as they are now, of those that deform, else NULL; only
-                                          for distances from these: NULL if none is asked for */
+        *body; /* (collider_count) the present shapes of those that deform, else NULL; may be
+                                          NULL where no distance from these is asked for */
 } drape_configuration;
 
 /* The collider whose distance counts in a configuration. */
@@ -117,26 +120,26 @@ typedef struct drape_swings {
     int32_t nodes;
 } drape_swings;
 
-/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same
- * for all points, on which the pair keeps what it must of its gap (additive continuous collision
- * detection, Li et al. 2021, Codimensional IPC, algorithm 1). It does not search beyond `limit`, which it
- * returns at most. A pair whose gap at x has no side: `limit`. The points of a collider that turns, unless
- * swings is NULL, go on circles instead. */
+/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same for
+ * all points, on which the pair keeps what it must of its gap (additive continuous collision detection, Li et
+ * al. 2021, Codimensional IPC, algorithm 1). The search ends at `limit`, the largest value that is returned,
+ * also for a pair whose gap at x has no side. Points of a collider that turns go on circles if swings is not
+ * NULL. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y,
                                 const drape_swings *swings, const drape_keep *keep, double limit);
 
-/* Lower bounds of the distance between the two pieces, cheaper than their closest points. */
+/* Lower bounds of the distance between the two pieces, cheaper than their closest points: */
 
-/* Bounds the distance of the pieces, not surfaces, on their straight path from x to y, by the axes through
- * their centres at either end; y NULL: at x. May be negative. x, y: (points x 3). */
+/* The bound on the straight path from x to y (points x 3), from the axes through the centres of the pieces at
+ * either end; y NULL: at x. May be negative. Not for surfaces. */
 double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y);
 
-/* Whether that bound is at least a distance > 0, without its square roots: of the pairs of a search most
- * are so far apart. */
+/* Whether that bound is at least a distance > 0, without its square roots: for most pairs of a search it
+ * is. */
 bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double *y, double distance);
 
-/* Bounds how much the distance of the pieces changes between x and y: the sum of the largest moves of a point
- * of each, without their common motion. */
+/* An upper bound of the change of the distance between x and y: the sum of the largest moves of a point of
+ * either piece, without their common motion. */
 double drape_bound_change(const drape_pair *pair, const double *x, const double *y);
 
 #endif

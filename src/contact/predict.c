@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-#define NEAR 0.1 /* relative difference of forces below which the tangent is used */
+#define NEAR 0.1 /* relative difference of forces below which the Jacobian has the tangent */
 
 drape_status drape_predictions_init(drape_arena *arena, int32_t points, drape_predictions *p)
 {
@@ -52,7 +52,7 @@ bool drape_predictions_add(drape_predictions *p, const drape_active_contact *con
     return true;
 }
 
-/* NULL: none. */
+/* The prediction for a contact; NULL: there is none. */
 static drape_predicted *find(const drape_predictions *p, const drape_active_contact *contact)
 {
     for (int32_t i = p->count > 0 ? p->first[contact->pair.node[0]] : -1; i >= 0; i = p->list[i].next)
@@ -80,7 +80,7 @@ double drape_predictions_stiffness(const drape_predictions *p, const drape_activ
     return of->secant;
 }
 
-/* The normal force if only the gap changes, and its rate with it. */
+/* The normal force if the gap has another value, and its rate the value that follows from the weight. */
 static double force_at(const drape_gap *gap, const drape_contact_law *law, double weight, double v[4][3],
                        double value)
 {
@@ -98,8 +98,8 @@ static double force_at(const drape_gap *gap, const drape_contact_law *law, doubl
     return drape_normal_force(&normal);
 }
 
-/* The force falls with the gap, which is bisected in its logarithm until half of its digits are known. The
- * bounded barrier of exempt cloth is near enough to linear. */
+/* The force falls with the gap, whose logarithm is bisected until half of the digits are known. The bounded
+ * barrier of exempt cloth has no secant: it is near enough to linear. */
 double drape_predicted_stiffness(const drape_gap *gap, const drape_contact_law *law, double weight,
                                  double v[4][3], double force)
 {

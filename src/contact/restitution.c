@@ -10,7 +10,7 @@
 
 drape_normal drape_normal_at(const drape_gap *gap, const drape_contact_law *law, double v[4][3])
 {
-    drape_normal normal = {.lambda = drape_contact_normal_force(gap, law)};
+    drape_normal normal = {.lambda = drape_law_normal_force(gap, law)};
     const double eps = law->restitution_velocity, kappa = law->damping;
     double u = 0;
     if (!(kappa > 0))

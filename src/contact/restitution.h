@@ -3,7 +3,7 @@
  * of an impact, with exact derivatives:
  *     N = lambda (1 - kappa f(u/eps)),   kappa = (1 - e^2)/(1 + e^2),
  *     f(y) = 2 y - y |y| for |y| < 1,    sign(y) beyond
- * with lambda the force of the barrier (force.h), u the rate of the gap, e the coefficient of restitution and
+ * with lambda the force of the barrier (law.h), u the rate of the gap, e the coefficient of restitution and
  * eps the restitution velocity. Damping in proportion to the elastic force is that of Hunt and Crossley 1975
  * (Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42); f, which is that
  * of friction (friction.h), bounds it:
@@ -19,7 +19,7 @@
 #ifndef DRAPE_CONTACT_RESTITUTION_H
 #define DRAPE_CONTACT_RESTITUTION_H
 
-#include "contact/force.h"
+#include "contact/law.h"
 
 /* f(speed/eps)/speed [s/m], for a speed of at least 0; also that of friction. */
 static inline double drape_secant_of_speed(double speed, double eps)
@@ -29,9 +29,9 @@ static inline double drape_secant_of_speed(double speed, double eps)
 
 typedef struct drape_normal {
     double lambda; /* [N] */
-    double share;  /* kappa f(u/eps), of lambda: it dissipates energy; 0 if e = 1 */
+    double share;  /* kappa f(u/eps): the dissipative share of lambda; 0 if e = 1 */
     double slope;  /* its derivative by u [s/m], >= 0 */
-    double secant; /* share/u [s/m], >= slope/2: for the symmetric bound, as that of friction */
+    double secant; /* share/u [s/m], >= slope/2: for the symmetric bound, as for friction */
 } drape_normal;
 
 /* The derivatives by x of lambda and of u, (3 points) each. */
@@ -57,8 +57,8 @@ void drape_normal_add_by_x(const drape_gap *gap, const drape_normal *normal,
 /* g = the dissipative part of the force (12), overwritten. */
 void drape_restitution_force(const drape_gap *gap, const drape_normal *normal, double *g);
 
-/* h += slope lambda dgap dgap' (12 x 12), which is positive semidefinite: dg/dv of the dissipative part for
- * the slope of the normal, and a bound of it for its secant. */
+/* h += slope lambda dgap dgap' (12 x 12), which is positive semidefinite: dg/dv of the dissipative part if
+ * slope is that of the normal, and an upper bound of it if slope is the secant. */
 void drape_restitution_add_dgdv(const drape_gap *gap, const drape_normal *normal, double slope, double *h);
 
 /* h += dg/dx of the dissipative part (12 x 12). */

@@ -112,7 +112,7 @@ static members members_of(const drape_self_search *s, int32_t leaf, drape_elemen
                      .high = (const double(*)[3])s->high[leaf]};
 }
 
-/* Which of four elements an axis separates, by more than reach, from a whole cluster. */
+/* Which of four elements are separated from a whole cluster, by an axis and by more than reach. */
 LANES_INLINE lanes_mask apart_from_cluster(const drape_path_boxes *boxes, const members *from, double reach,
                                            int ends)
 {

@@ -1,9 +1,8 @@
 /*
  * self_search.h: finds the pairs of cloth with cloth whose pieces may be near each other, on a straight path
- * of all nodes. Clusters of a few faces are compared first: boxes keep apart those that are far from each
- * other, and those of a flat sheet that are neighbours are kept apart by how little the sheet is deformed
- * (flat.h). So only the elements where cloth is folded, or where layers are near each other, are looked at
- * one by one.
+ * of all nodes. Clusters of a few faces are compared first: boxes separate clusters that are far from each
+ * other, and neighbours in a flat sheet are separated because the sheet is little deformed (flat.h). So
+ * elements are compared one by one only where cloth is folded, or where layers are near each other.
  */
 #ifndef DRAPE_CONTACT_SELF_SEARCH_H
 #define DRAPE_CONTACT_SELF_SEARCH_H
@@ -15,7 +14,7 @@ typedef struct drape_self_search {
     drape_clusters clusters;
     drape_flat flat;
     drape_path_boxes *boxes[DRAPE_ELEMENT_KINDS]; /* (groups) */
-    int64_t *fitted;                              /* (clusters) the search that these are of */
+    int64_t *fitted;                              /* (clusters) the search in which the boxes were fitted */
     double (*low)[2][3], (*high)[2][3];           /* (branches) by end and axis */
     bool *marked;                                 /* (branches) */
     int64_t search;                               /* the number of searches so far */
@@ -25,9 +24,9 @@ typedef struct drape_self_search {
 drape_status drape_self_search_create(drape_arena *arena, const drape_model *model, const double *rest,
                                       drape_self_search *out);
 
-/* Pairs that may be nearer than `reach` on the path from x to y (y NULL: at x), without those whose
- * pieces are surely at least half of their distance at rest plus `slack` apart, which may be visited or
- * not. marked (node_count): only clusters of which one has a marked node; NULL: all. */
+/* Which pairs are searched: those that may be nearer than `reach` on the path from x to y (y NULL: at x).
+ * Pairs whose pieces are surely at least half of their distance at rest plus `slack` apart may be left out.
+ * marked (node_count): only pairs of clusters of which one has a marked node; NULL: all. */
 typedef struct drape_self_query {
     const double *x, *y;
     double reach, slack, rounding; /* [m] */

@@ -58,8 +58,8 @@ static drape_status reserve(drape_pair_sorter *s, const drape_pair *pairs, int32
     return capacity > s->capacity || first_capacity > s->first_capacity ? DRAPE_E_MEMORY : DRAPE_OK;
 }
 
-/* Writes the numbers of the pairs by one of their ranks, those with the same one as they were; from NULL:
- * as they are listed. */
+/* Writes the numbers of the pairs sorted by one of their ranks. Pairs with the same one stay in the order of
+ * `from`; NULL: in which they are listed. */
 static void order_by(const drape_pair_sorter *s, int which, const drape_pair *pairs, int32_t count,
                      const int32_t *from, int32_t *to)
 {

@@ -1,6 +1,6 @@
 /*
- * sort_pairs.h: pairs by rank (pair.h), in time proportional to their number: those of a search come in the
- * order of trees of boxes.
+ * sort_pairs.h: sorts pairs by rank (pair.h), in time proportional to their number. A search finds them in
+ * the order of trees of boxes.
  */
 #ifndef DRAPE_CONTACT_SORT_PAIRS_H
 #define DRAPE_CONTACT_SORT_PAIRS_H

@@ -1,24 +1,24 @@
-/* sweep.c: what a moving collider would sweep over in a step, and the cloth that this would pass through,
- * moved along with it: see contact.h. */
-#include "contact/parts.h"
+/* sweep.c: moves cloth aside that a moving collider would sweep over in a step, and along with the collider
+ * the cloth that this cloth would pass through. See contact.h. */
+#include "contact/contact_parts.h"
 
 #include "base/clock.h"
 #include "base/vec3.h"
 
 #include <string.h>
 
-#define EDGES      0.5  /* of the activation distance of features: where the middle of an edge is put */
-#define CLOSE      0.05 /* of the activation distance: how far above that a march along the path may end */
-#define MAX_PASSES 2    /* over all colliders: one may push a node towards another */
+#define EDGES      0.5  /* gap to which the middle of an edge is moved, in activation distances of features */
+#define CLOSE      0.05 /* how much farther away the search along a path may end, in activation distances */
+#define MAX_PASSES 2    /* over all colliders: one of them may push a node towards another one */
 
 static double distance_from(const drape_collider *collider, const double *x, double *normal)
 {
     return collider->ops->distance(collider->values, &collider->shape, x, normal, NULL);
 }
 
-/* Moves a node that goes from x to y, both in the collider's own coordinates, to where it slides on the
- * collider from the place at which the path comes within a distance of it. Returns whether it does. A node
- * that begins inside has no side, and stays. */
+/* A node goes from x to y, both in the collider's own coordinates. If its path comes within a distance of the
+ * surface, the node slides on the surface from there on: y becomes the place that it slides to. Returns
+ * whether it slides. A node that begins inside has no side, and keeps its path. */
 static bool slide(const drape_collider *collider, double distance, double rounding, const double *x,
                   double *y)
 {
@@ -52,9 +52,9 @@ static bool slide(const drape_collider *collider, double distance, double roundi
     return true;
 }
 
-/* Nodes that slide round a moving body may leave the middle of their edge in it, where nothing would push it
- * out before the end of the step. Moves the nodes of such edges outwards alike, and marks them: the pass of
- * each (node_count) in which it slid last. */
+/* Where nodes slide round a moving body, the middle of an edge between them may be in the body, and nothing
+ * would push it out before the end of the step. Moves both nodes of such an edge outwards. slid: (node_count)
+ * the last pass in which each node slid. */
 static void lift_edges(const drape_contact *c, int32_t collider, int pass, uint8_t *slid, double *y)
 {
     const drape_model *m = c->model;
@@ -87,9 +87,9 @@ static void lift_edges(const drape_contact *c, int32_t collider, int pass, uint8
     }
 }
 
-/* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. A node that its
- * surface does not hold goes where it goes. After the first pass only those that slid in the last one are
- * elsewhere. */
+/* Lets the nodes of y that a collider reaches slide on it; returns whether there are any. Nodes that the
+ * collider lets in keep their place. After the first pass only nodes that slid in the last one have another
+ * place than before. */
 static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, double *y)
 {
     const drape_collider *k = &c->model->colliders[collider];
@@ -126,15 +126,15 @@ static bool sweep(drape_contact *c, int32_t collider, int pass, uint8_t *slid, d
 
 /* ---- Triangles that deform ---- */
 
-/* A node that a triangle reaches keeps its place over it from then on, but for what it moves along it: at the
- * end of the step it is as far from the triangle as the triangle may come. */
+/* A node that a triangle reaches stays over the triangle from then on, but may slide along it: at the end of
+ * the step the node is as far from the triangle as the triangle may come. */
 
 /* A node and the first triangle that reaches it. */
 typedef struct meeting {
     drape_contact *contact;
     const double *y;
     int32_t node;
-    double fraction, gap; /* of the path; at its beginning [m] */
+    double fraction, gap; /* step fraction at which they meet; gap at the beginning of the path [m] */
     drape_pair pair;
 } meeting;
 
@@ -143,7 +143,8 @@ static double aim_of(const drape_pair *pair, double gap)
     return fmin(gap, DRAPE_RESTING * pair->distance);
 }
 
-/* Of triangles that are near from the beginning on, the nearest counts. */
+/* The triangle that meets the node first counts, or the nearest of those that are near from the beginning
+ * on. */
 static void meet_triangle(void *user, int32_t triangle)
 {
     meeting *m = user;
@@ -175,7 +176,7 @@ static void meet_triangle(void *user, int32_t triangle)
     m->pair = pair;
 }
 
-/* Two unit vectors in the plane of a triangle, and its normal; false if it has none. */
+/* Two unit vectors in the plane of a triangle, and its normal; false if it has no area. */
 static bool frame_of(double corner[3][3], double frame[3][3])
 {
     double side[3], length;
@@ -192,8 +193,8 @@ static bool frame_of(double corner[3][3], double frame[3][3])
     return length > 0;
 }
 
-/* The direction from the triangle to the node when they meet turns with the triangle until the end. Moves
- * the end of the node along it; returns whether it had to. */
+/* The direction from the triangle to the node when they meet turns with the triangle until the end. Moves the
+ * node y along it until its gap is the aim; returns whether the gap was smaller. */
 static bool slide_on_triangle(const meeting *m, double *y)
 {
     const double *x = m->contact->start, aim = aim_of(&m->pair, m->gap), t = m->fraction;
@@ -223,9 +224,9 @@ static bool slide_on_triangle(const meeting *m, double *y)
     return true;
 }
 
-/* Moves the nodes of y (points x 3; its points of colliders are those at the end of the step) that triangles
- * of colliders that deform reach, on straight paths of all points from the beginning of the step, to where
- * they slide on these triangles. Returns whether there are any. */
+/* Lets the nodes of y (points x 3) slide on triangles of colliders that deform, where these reach them on
+ * straight paths of all points from the beginning of the step. The points of colliders in y are those of the
+ * end of the step. Returns whether any node slides. */
 static bool slide_on_meshes(drape_contact *c, double *y)
 {
     drape_path_bvh *tree = &c->broad.obstacles;
@@ -305,8 +306,8 @@ static void meet(void *user, const drape_pair *pair)
     }
 }
 
-/* Whether cloth passes through cloth on its path to y; what does is added to what is carried. *grown:
- * something is. */
+/* Whether cloth passes through cloth on its path to y. The nodes that do are added to those that are carried;
+ * *grown: whether any are new. */
 static bool layers_meet(drape_contact *c, const double *y, bool *grown)
 {
     layers of = {.contact = c};

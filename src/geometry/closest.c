@@ -6,9 +6,9 @@
 #include <stdbool.h>
 #include <string.h>
 
-#define PARALLEL                                                                                             \
-    1e-12 /* sin^2 of the angle below which segments count as parallel: end points are then as near as any
-             others */
+/* sin^2 of the angle below which segments count as parallel: an end point of one is then as near as any other
+ * point */
+#define PARALLEL 1e-12
 
 static double clamp01(double t)
 {

@@ -12,15 +12,15 @@
 
 #include <float.h>
 
-/* A distance below this share of the largest coordinate is rounding: closest points and their distance have
- * errors of some hundred units in the last place, and what is built on them should not meet its own. */
+/* A distance below this share of the largest coordinate may be rounding: closest points and their distance
+ * have errors of some hundred units in the last place; the rest is a margin for what is computed from
+ * them. */
 #define DRAPE_CLOSEST_ROUNDING (1e4 * DBL_EPSILON)
 
 typedef struct drape_closest {
-    int points;        /* 4, or fewer after drape_closest_reduce */
-    int params;        /* number of parameters t: 2 inside a face or between two edges, 0 between two
-                           points */
-    double c[4];       /* weights of points 0 1 2 3 */
+    int points;  /* 4, or fewer after drape_closest_reduce */
+    int params;  /* number of parameters t: 2 inside a face or between two edges, 0 between two points */
+    double c[4]; /* weights of points 0 1 2 3 */
     double dcdt[2][4]; /* dc/dt */
     double distance;   /* |p| [m] */
     double normal[3];  /* n; 0 where the primitives touch */

@@ -5,9 +5,10 @@
 #include "geometry/nearest.h"
 #include "model/render_mesh.h"
 
-/* Binds a point to the nearest triangle of a tree that is fitted to x (node_count x 3): bound, it is where it
- * was. With normals (node_count x 3) it is along those, unless it is beyond their centre of curvature; NULL:
- * it is flat. Returns its distance from the triangle [m]. triangle is its number in the tree. */
+/* Binds a point to the nearest triangle of a tree that is fitted to x (node_count x 3), so that at x the
+ * bound point is where the point is. Its height is along the interpolated normals (node_count x 3), unless
+ * the point is beyond their centre of curvature, else along the normal of the triangle; normals NULL: always
+ * that. Returns the distance from the triangle [m]. to->triangle is a number in the tree. */
 double drape_embed(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
                    drape_embedded *to);
 

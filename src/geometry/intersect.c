@@ -70,7 +70,7 @@ drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, con
         const drape_box box = drape_box_of(edges->edge + 2 * (size_t)s.edge, 2, edges->x, 0);
         s.tested = 1;
         drape_bvh_query(&tree, &box, try_triangle, &s);
-        status = drape_check_cancel_after(ctx, 64 * s.tested); /* more where signs need long sums */
+        status = drape_check_cancel_after(ctx, 64 * s.tested);
     }
     drape_arena_free(&arena);
     return status;
@@ -121,9 +121,9 @@ drape_status drape_find_intersections(drape_context *ctx, const drape_model *m, 
  * products of three coordinates, each of which is a sum of four doubles (Shewchuk 1997, Adaptive Precision
  * Floating-Point Arithmetic and Fast Robust Geometric Predicates, sections 2.2 to 2.5). */
 
-/* Of the volume in doubles, relative to the product of the lengths: the bound of Shewchuk's orient3d, 7/2
- * epsilon of the permanent of the magnitudes, which is at most 2/sqrt(3) of that product (Carlen, Lieb & Loss
- * 2006, An inequality of Hadamard type for permanents); rounded up to a power of 2. */
+/* Bound of the error of the volume in doubles, relative to the product of the lengths: that of Shewchuk's
+ * orient3d, 7/2 epsilon of the permanent of the magnitudes, which is at most 2/sqrt(3) of that product
+ * (Carlen, Lieb & Loss 2006, An inequality of Hadamard type for permanents); rounded up to a power of 2. */
 #define ROUNDING (8 * DBL_EPSILON)
 /* 2^27 + 1: splits a double into two halves of its digits (Dekker 1971). */
 #define SPLITTER ((double)(1 << (DBL_MANT_DIG + 1) / 2) + 1)
@@ -215,7 +215,8 @@ int drape_orient(const double *a, const double *b, const double *c, const double
     const double volume = vec3_dot(n, w);
     if (fabs(volume) > ROUNDING * vec3_norm(u) * vec3_norm(v) * vec3_norm(w))
         return volume > 0 ? 1 : -1;
-    for (int k = 0; k < 3; k++) /* layers that lie on each other in a plane of space, without long sums */
+    for (int k = 0; k < 3;
+         k++) /* points in one plane of coordinates, as of layers that begin so, need no long sums */
         if (u[k] == 0 && v[k] == 0 && w[k] == 0)
             return 0;
     /* If u = b - a, v = c - a and w = d - a are exact, the volume is u . (v x w); in general it is b . (c

@@ -12,10 +12,9 @@
 
 #include "model/model.h"
 
-/* On which side of a plane a point lies, exactly. The sign is that of the real numbers that the
- * coordinates are, whatever the rounding, as long as each is 0 or of a magnitude between 1e-90 and 1e90.
- * The sign of the volume of the tetrahedron a b c d: 1 if a, b, c are counterclockwise seen from d, -1 if
- * clockwise, 0 if the four points lie in a plane. */
+/* On which side of the plane a b c the point d lies: the sign of the volume of the tetrahedron a b c d, 1 if
+ * a, b, c are counterclockwise seen from d, -1 if clockwise, 0 if the four points lie in a plane. The sign is
+ * exact as long as each coordinate is 0 or of a magnitude between 1e-90 and 1e90. */
 int drape_orient(const double *a, const double *b, const double *c, const double *d);
 
 /* Edges and triangles over positions x (any count x 3) [m], which must be finite. */
@@ -32,9 +31,9 @@ drape_surface drape_surface_of(const drape_model *model, const double *x); /* of
 bool drape_intersect_edge(const double *p, const double *q, const double *a, const double *b,
                           const double *c);
 
-/* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that it passes through,
- * edges in their order. If both have the same x, that of the cloth, pairs that share a node do not count, nor
- * those with nodes that are sewn together. Errors: DRAPE_E_MEMORY. */
+/* Calls visit for each pair of an edge of `edges` and a triangle of `triangles` that the edge passes through,
+ * edges in their order. If both surfaces have the same x, that of the cloth, pairs that share a node or have
+ * nodes that are sewn together do not count. Errors: DRAPE_E_MEMORY. */
 typedef void drape_intersection_visit(void *user, int32_t edge, int32_t triangle);
 drape_status drape_intersect(drape_context *ctx, const drape_surface *edges, const drape_surface *triangles,
                              drape_intersection_visit *visit, void *user);

@@ -256,10 +256,10 @@ typedef struct ray {
     int winding;
 } ray;
 
-/* The side of the line from corner a to corner b, seen along x, on which the ray is: positive, negative, 0
- * for a line that is seen as a point. A ray that meets the line is beside it, as if it were moved a little
- * along y and far less along z, so that it passes through one of the triangles around an edge or a point.
- * The sides of an edge have opposite signs to the last digit in both of its triangles. */
+/* The side of the line from corner a to corner b, seen along x, on which the ray is: positive, negative, or 0
+ * if the line is seen as a point. A ray that meets the line counts as moved a little along y and far less
+ * along z, so that it passes through exactly one of the triangles around an edge or a point. Both triangles
+ * of an edge compute the same number with opposite signs. */
 static double side_of_line(const ray *r, int32_t a, int32_t b)
 {
     const bool ordered = a < b;

@@ -38,8 +38,8 @@ static void look_near(search *s, int32_t triangle)
     keep(s, triangle, at.distance, weights);
 }
 
-/* Möller & Trumbore (1997), Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2, with sides
- * that belong to both of their triangles. */
+/* Möller & Trumbore (1997), Fast, minimum storage ray-triangle intersection, J. Graphics Tools 2. A ray
+ * through a side meets both triangles of that side. */
 static void look_along(search *s, int32_t triangle)
 {
     const int32_t *node = s->tree->node + 3 * (size_t)triangle;

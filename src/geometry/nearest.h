@@ -1,5 +1,5 @@
-/* nearest.h: the nearest triangle to a point, and the first one on a ray, in a tree of boxes. The answer
- * does not depend on the shape of the tree: of equally near triangles it is the one of the lowest number. */
+/* nearest.h: the nearest triangle to a point, and the first one on a ray, in a tree of boxes. The result does
+ * not depend on the shape of the tree: of equally near triangles, the one with the lowest number is found. */
 #ifndef DRAPE_GEOMETRY_NEAREST_H
 #define DRAPE_GEOMETRY_NEAREST_H
 

@@ -47,8 +47,7 @@ drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double 
 static int32_t box_number(double x, double per_box)
 {
     double number = x * per_box;
-    if (!(fabs(number) <
-          INT32_MAX / 2)) /* those beyond share a box: numbers and their neighbours have 32 bits */
+    if (!(fabs(number) < INT32_MAX / 2)) /* points farther away share a box: box numbers have 32 bits */
         return 0;
     int32_t cut = (int32_t)number;
     return cut - (number < cut);
@@ -110,9 +109,9 @@ typedef struct search {
     int count; /* more than DRAPE_MAX_NEIGHBOURS: found is incomplete */
 } search;
 
-/* Adds the points from first to last that belong to the row, and not to another row with the same hash. A
- * point is always written, and counted only if it belongs: a branch here would be mispredicted half of the
- * time. */
+/* Adds the points from first to last that belong to the row, not to another row with the same hash, and are
+ * near. Each point is written, and counted only if it is added: a branch here would be mispredicted half of
+ * the time. */
 static inline void search_range(const drape_neighbours *s, search *q, uint64_t row, int32_t first,
                                 int32_t last)
 {
@@ -231,7 +230,7 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
         int32_t last = s->start[bucket + 1], candidates = last - at;
         for (int k = 0; k < a.count; k++)
             candidates += a.range[k].last - a.range[k].first;
-        if (candidates > capacity - count) /* each is written, and counted only if it is near */
+        if (candidates > capacity - count) /* pair_with writes every pair, and counts those that are near */
             return -1;
         count = pair_with(s, at, a.row, at + 1, last, reach * reach, count);
         for (int k = 0; k < a.count; k++)
@@ -241,7 +240,7 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
 }
 
 /* Turns pairs into a list for every point, in ascending order: first into unordered lists, in near; then each
- * point in turn is appended to the lists of the points in its own list. Returns false if a list is too
+ * point in turn is appended to the lists of all points in its own list. Returns false if a list is too
  * long. */
 static bool spread_pairs(drape_neighbours *s, int32_t count)
 {

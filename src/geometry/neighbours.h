@@ -50,8 +50,8 @@ int drape_neighbours_search(const drape_neighbours *neighbours, int32_t point, c
                             int32_t found[DRAPE_MAX_NEIGHBOURS + 1]);
 
 /* Finds the numbers, in ascending order, of all points nearer to a point at x than the reach, and of some
- * others. *near points to an array of the neighbours, valid until the next update, or to `scratch`. Returns
- * their count, or -1 if there are more than DRAPE_MAX_NEIGHBOURS. */
+ * other points. *near is the array of these numbers, valid until the next update: a list, or `scratch`.
+ * Returns their count, or -1 if there are more than DRAPE_MAX_NEIGHBOURS. */
 static inline int drape_neighbours_of(const drape_neighbours *s, int32_t point, const double *x,
                                       int32_t scratch[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
 {

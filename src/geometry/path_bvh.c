@@ -72,7 +72,7 @@ drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, 
 
 /* ---- Refitting ---- */
 
-/* Inline, since most of the time of a query that meets nothing is spent here. */
+/* Inline, since a query that finds nothing spends most of its time here. */
 static inline drape_box box_of(const int32_t *node, int nodes, const double *x)
 {
     drape_box box;
@@ -242,14 +242,15 @@ void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from
 
 /* ---- Two trees ---- */
 
-/* A child of one tree, or all children of a branch, and a branch of the other, which are to be tested. */
+/* A test that is to be made: of one child, or of all children, of a branch of one tree, against all children
+ * of a branch of the other tree. */
 typedef struct meeting {
     int32_t branch[2];
     int32_t lane; /* of the child; -1: all */
     int32_t from; /* the tree of the child */
 } meeting;
 
-/* Each meeting leaves at most LANES^2 others, one level deeper in one tree. */
+/* Each test leads to at most LANES^2 others, one level deeper in one tree. */
 #define MEETINGS (LANES * LANES * DRAPE_BVH_DEPTH)
 
 /* Tests one child, or all, of a branch against all children of the other branch. A branch that meets

@@ -1,7 +1,7 @@
 /*
- * path_bvh.h: a tree of boxes over edges or triangles that move straight from one configuration to
- * another. Each branch has four children, which are tested at once, and each child has two boxes, one
- * around each end of the path. So a motion that pieces have in common brings no pair together.
+ * path_bvh.h: a tree of boxes over edges or triangles that move straight from one configuration to another.
+ * Each branch has four children, which are tested at once, and each child has two boxes, one around each end
+ * of the path, so that pieces are not taken to meet because of a motion that they have in common.
  */
 #ifndef DRAPE_GEOMETRY_PATH_BVH_H
 #define DRAPE_GEOMETRY_PATH_BVH_H
@@ -74,14 +74,14 @@ typedef struct drape_path_bvh {
 drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
                                   const double *x, drape_path_bvh *bvh);
 
-/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. Marks elements
- * with a marked point; NULL: all. grow: (count) [m] by which the box of each element is enlarged; NULL:
- * none is. */
+/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. marked: elements
+ * with a marked point are marked; NULL: all are. grow: (count) [m] by which the box of each element is
+ * enlarged; NULL: by nothing. */
 void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
                         const double *grow);
 
-/* What is searched: elements that no axis separates, by more than reach at both ends, from some nodes on
- * their path. */
+/* A search for the elements that no axis separates, by more than reach at both ends, from some nodes on their
+ * path. */
 typedef struct drape_path_query {
     const int32_t *node;
     int nodes;
@@ -94,14 +94,15 @@ typedef struct drape_path_query {
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
-/* Elements of a tree, and the points that they have. */
+/* Some elements of a tree, and the points of these elements. */
 typedef struct drape_path_elements {
     const int32_t *element, *point;
     int32_t elements, points;
 } drape_path_elements;
 
-/* The same for some elements of a tree that is not fitted, by a look at each of their points: for a few
- * queries that is less than to fit it. marked as in drape_path_bvh_fit; side: (largest point + 1) scratch. */
+/* The same for some elements of a tree that is not fitted, by a test of each of their points: for a few
+ * queries this costs less than to fit the tree. marked as in drape_path_bvh_fit; side: (largest point + 1)
+ * scratch. */
 void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query,
                          const drape_path_elements *among, const bool *marked, uint8_t *side,
                          drape_bvh_visit *visit, void *user);

@@ -5,11 +5,10 @@
 #include "contact/barrier.h"
 #include "geometry/intersect.h"
 #include "geometry/nearest.h"
-#include "realtime/room.h"
 
 #include <string.h>
 
-#define MARGIN   DRAPE_BARRIER_GENTLE /* of the activation distance, by which a path ends outside */
+#define MARGIN   DRAPE_BARRIER_PARABOLA /* of the activation distance, by which a path ends outside */
 #define FLAT     0.5 /* share of the normals of a patch that is left in their sum: below it is curled up */
 #define KEPT     0.3 /* cosine to the cloth: a direction more along the cloth than this is found anew */
 #define MARCHES  64  /* along a path out */
@@ -127,7 +126,7 @@ static int sample(const drape_contact *c, int32_t collider, int32_t face, bool *
         memset(x[count], 0, 3 * sizeof(double));
         for (int a = 0; a < 3; a++)
             vec3_add_scaled(share[i][a], c->x + 3 * (size_t)n[a], x[count]);
-        count += drape_room_distance(c, collider, x[count], NULL) < 0;
+        count += drape_relaxed_distance(c, collider, x[count], NULL) < 0;
     }
     return count;
 }
@@ -187,7 +186,7 @@ static double path_out(const drape_contact *c, int32_t collider, const double fr
                  longest = FARTHEST * length_of(&c->model->colliders[collider].shape);
     double s = 0, x[3] = {from[0], from[1], from[2]};
     for (int i = 0; i < MARCHES && s < longest; i++) {
-        const double gap = drape_room_distance(c, collider, x, NULL);
+        const double gap = drape_relaxed_distance(c, collider, x, NULL);
         if (!(gap < margin))
             break;
         s += margin - fmin(gap, 0);
@@ -195,7 +194,7 @@ static double path_out(const drape_contact *c, int32_t collider, const double fr
         vec3_add_scaled(s, along, x);
     }
     for (int32_t other = 0; other < c->model->collider_count; other++)
-        if (other != collider && drape_room_distance(c, other, x, NULL) < 0)
+        if (other != collider && drape_relaxed_distance(c, other, x, NULL) < 0)
             return longest;
     return fmin(s, longest);
 }
@@ -298,7 +297,8 @@ static bool is_astray(const search *s, int32_t face, const double to[3])
     bool pierced, astray = false;
     const int count = sample(s->c, s->collider, face, &pierced, x);
     for (int i = 0; i < count; i++)
-        astray = astray || (drape_room_distance(s->c, s->collider, x[i], n) < 0 && vec3_dot(n, to) < -KEPT);
+        astray =
+            astray || (drape_relaxed_distance(s->c, s->collider, x[i], n) < 0 && vec3_dot(n, to) < -KEPT);
     return astray || pierced;
 }
 

@@ -36,6 +36,13 @@ const double *drape_relaxed_bound_of(const drape_contact *c, int32_t collider)
 
 /* ---- Queries ---- */
 
+double drape_relaxed_distance(const drape_contact *c, int32_t collider, const double *x, double *normal)
+{
+    const drape_configuration now = {.model = c->model, .body = c->body};
+    return drape_collider_distance(drape_configuration_body(&now, collider), &c->pose[collider], x, normal,
+                                   NULL);
+}
+
 /* The place of the first node that is not before this one. */
 static int32_t place_of(const drape_relaxed_set *set, int32_t collider, int32_t node)
 {

@@ -9,7 +9,7 @@
 #define DRAPE_REALTIME_RELAXED_H
 
 #include "base/archive.h"
-#include "contact/parts.h"
+#include "contact/contact_parts.h"
 
 typedef struct drape_relaxed_node {
     int32_t collider; /* -1: pinned pieces of cloth */
@@ -82,6 +82,10 @@ static inline drape_relaxed_set *drape_relaxed_of(const drape_contact *contact)
 
 /* The ball around a collider as contact has fitted it. */
 const double *drape_relaxed_bound_of(const drape_contact *contact, int32_t collider);
+
+/* The distance [m] of a point from a collider, where contact is evaluated. normal (3) may be NULL. */
+double drape_relaxed_distance(const drape_contact *contact, int32_t collider, const double *x,
+                              double *normal);
 
 /* NULL: the node is held. */
 drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node);

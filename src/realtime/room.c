@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-#define MARGIN DRAPE_BARRIER_GENTLE /* of the activation distance, that cloth needs on either side */
+#define MARGIN DRAPE_BARRIER_PARABOLA /* of the activation distance, that cloth needs on either side */
 #define ACROSS 0.3 /* cosine: surfaces more upright than this to the cloth are left along their own normal */
 #define PASSES 3   /* to find the nearest place outside of a curved surface */
 #define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
@@ -125,19 +125,12 @@ static cloth_point point_of(const drape_contact *c, const drape_active_contact *
     return p;
 }
 
-double drape_room_distance(const drape_contact *c, int32_t collider, const double *x, double *normal)
-{
-    const drape_configuration now = {.model = c->model, .body = c->body};
-    return drape_collider_distance(drape_configuration_body(&now, collider), &c->pose[collider], x, normal,
-                                   NULL);
-}
-
 /* Moves a point of the cloth out of a collider until its gap is the margin: across the cloth, in which it
  * cannot go far, or straight out of a surface that the cloth runs into. Returns the direction. */
 static void move_out(const drape_contact *c, int32_t collider, double margin, const cloth_point *p,
                      double q[3], double direction[3])
 {
-    double n[3], gap = drape_room_distance(c, collider, p->x, n);
+    double n[3], gap = drape_relaxed_distance(c, collider, p->x, n);
     const double along = vec3_dot(n, p->normal);
     memcpy(q, p->x, 3 * sizeof *q);
     for (int k = 0; k < 3; k++)
@@ -147,7 +140,7 @@ static void move_out(const drape_contact *c, int32_t collider, double margin, co
         if (!(slope > 0))
             return;
         vec3_add_scaled((margin - gap) / slope, direction, q);
-        gap = drape_room_distance(c, collider, q, n);
+        gap = drape_relaxed_distance(c, collider, q, n);
     }
 }
 
@@ -158,7 +151,7 @@ static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, 
     double n[3];
     if (!may_be_near(c, c->pose, other, margin, q))
         return false;
-    return drape_room_distance(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
+    return drape_relaxed_distance(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
 
 /* Says that nodes have no room at a collider; -1: at pinned pieces of cloth. */
@@ -179,7 +172,8 @@ static void reach_from_pins(const drape_contact *c, int32_t collider, double mar
 {
     const drape_model *m = c->model;
     for (int32_t i = 0; i < m->node_count; i++)
-        reach[i] = m->pinned[i] ? margin - drape_room_distance(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
+        reach[i] =
+            m->pinned[i] ? margin - drape_relaxed_distance(c, collider, c->x + 3 * (size_t)i, NULL) : 0;
     for (bool more = true; more;) {
         more = false;
         for (int32_t e = 0; e < m->edge_count; e++)
@@ -245,7 +239,7 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
                 vec3_add_scaled(shares[i][a], c->x + 3 * (size_t)p.node[a], p.x);
             if (drape_model_ignores(c->model, collider, p.node[0]) ||
                 !may_be_near(c, c->pose, collider, margin, p.x) ||
-                !(drape_room_distance(c, collider, p.x, NULL) < margin))
+                !(drape_relaxed_distance(c, collider, p.x, NULL) < margin))
                 continue;
             for (int a = 0; a < 3; a++)
                 vec3_add_scaled(shares[i][a], drape_relaxed_of(c)->normal + 3 * (size_t)p.node[a], p.normal);
@@ -291,7 +285,7 @@ static drape_status look_ahead(drape_contact *c, const double *x, double t, doub
         bool inside = false; /* a pin of the contact, in the collider */
         for (int a = 0; !relaxed->pins[collider] && !inside && a < p.nodes; a++)
             inside = c->model->pinned[p.node[a]] &&
-                     drape_room_distance(c, collider, c->x + 3 * (size_t)p.node[a], NULL) < margin;
+                     drape_relaxed_distance(c, collider, c->x + 3 * (size_t)p.node[a], NULL) < margin;
         if (inside) {
             relaxed->pins[collider] = true;
             status = block_pins(c, collider, margin, t, may_relax, added);
@@ -371,7 +365,7 @@ drape_status drape_room_relax(drape_contact *c, double t1, drape_relax_extent ex
     if (!status)
         status = relax(c, t1, extent, added);
     if (!status && !(status = go_to(c, c->start, c->start_t)))
-        c->press.work += drape_contact_potential(c) - before;
+        c->stiffening.work += drape_contact_potential(c) - before;
     c->seconds += drape_clock_seconds() - clock;
     return status;
 }
@@ -403,7 +397,7 @@ drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
     }
     c->listed = false;
     if (!status && !(status = go_to(c, c->start, c->start_t)))
-        c->press.work += drape_contact_potential(c) - before;
+        c->stiffening.work += drape_contact_potential(c) - before;
     return status;
 }
 
@@ -429,8 +423,8 @@ static void measure(drape_contact *c)
     for (int32_t i = 0; i < relaxed->exempt.count; i++) {
         drape_relaxed_node *node = &relaxed->nodes[i];
         if (node->collider >= 0 && (c->model->pinned[node->node] || drape_relaxed_goes_out(node)))
-            node->gap =
-                fmin(node->gap, drape_room_distance(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
+            node->gap = fmin(node->gap,
+                             drape_relaxed_distance(c, node->collider, c->x + 3 * (size_t)node->node, NULL));
         node->depth = fmax(0, -node->gap);
     }
 }
@@ -454,10 +448,10 @@ static bool is_out(void *user, const drape_relaxed_node *node)
     const drape_contact_def *def = &c->model->contact;
     const double distance = node->collider >= 0 ? c->broad.distance[node->collider] : 2 * def->self_thickness,
                  s = node->gap / distance;
-    if (node->blocked || node->fresh || node->exits || s < DRAPE_BARRIER_GENTLE)
+    if (node->blocked || node->fresh || node->exits || s < DRAPE_BARRIER_PARABOLA)
         return false;
-    const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db * c->press.factor * def->stiffness *
-                            (def->distance / distance);
+    const double pressure = -drape_barrier_at(s, DRAPE_BARRIER_PARABOLA).db * c->stiffening.factor *
+                            def->stiffness * (def->distance / distance);
     return (pressure <= node->factor * def->relaxed_pressure || c->model->pinned[node->node]) &&
            !is_pierced(c, node);
 }

@@ -41,7 +41,4 @@ drape_status drape_room_lacks(drape_contact *contact, double t1, drape_relax_ext
  * are where the step began, as far as pairs can be relaxed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_room_let_in(drape_contact *contact, const double *x, double t1);
 
-/* [m] From the surface of a collider, where contact is evaluated. normal (3): NULL: not asked for. */
-double drape_room_distance(const drape_contact *contact, int32_t collider, const double *x, double *normal);
-
 #endif

@@ -3,7 +3,7 @@
  * that are folded, crumpled and thrown at random beside colliders, in steps from far below the margin of a
  * search to many edges; and with what a contact finds that has no candidates of earlier searches.
  */
-#include "contact/parts.h"
+#include "contact/contact_parts.h"
 #include "entries/models.h"
 #include "support/scene.h"
 
@@ -252,7 +252,8 @@ static void check_that_all_near_is_found(const char *text, int least_active, int
         drape_contact *clean = open_contact(&other, motion);
         ck_assert_int_eq(drape_contact_evaluate_at(clean, &at), DRAPE_OK);
         check_active(&all, found);
-        c->press.factor = clean->press.factor; /* which follows from earlier steps, not from candidates */
+        c->stiffening.factor =
+            clean->stiffening.factor; /* which follows from earlier steps, not from candidates */
         compare_forces(c, clean, n, g);
         active += c->active.count;
         patches += c->step_candidates.sets > 1;

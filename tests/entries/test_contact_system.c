@@ -4,7 +4,7 @@
  */
 #include "assemble/check.h"
 #include "contact/broad_phase.h"
-#include "contact/force.h"
+#include "contact/law.h"
 #include "entries/models.h"
 #include "support/folder.h"
 #include "support/sample.h"
@@ -603,7 +603,7 @@ static void add_energy(void *user, const drape_pair *found)
                                    .low = DRAPE_LEAST_GAP,
                                    .stiffness = w->model->contact.stiffness * pair.area *
                                                 w->model->contact.distance / pair.distance};
-    w->energy += drape_contact_energy(&gap, &law);
+    w->energy += drape_law_energy(&gap, &law);
     w->acting++;
 }
 

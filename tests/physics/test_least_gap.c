@@ -5,7 +5,7 @@
  */
 #include "colliders/colliders.h"
 #include "contact/barrier.h"
-#include "contact/parts.h"
+#include "contact/contact_parts.h"
 #include "support/bytes.h"
 #include "support/crossings.h"
 #include "support/folder.h"
@@ -48,7 +48,7 @@ START_TEST(stiffening_is_work)
     for (int k = 1; k <= 100; k++) {
         const drape_energy before = drape_sim_energy(s.sim);
         scene_advance(&s, 0.01 * k);
-        const double now = contact->press.factor;
+        const double now = contact->stiffening.factor;
         raised += now > factor;
         added = fmax(added, now > factor ? (now / factor - 1) * before.contact : 0);
         factor = now;
@@ -77,7 +77,7 @@ START_TEST(what_begins_inside_is_pushed_out_gently)
         " 'gravity': [0, 0, 0], %s, 'duration': 1}",
         1e6, method_of("midpoint", 2e-4));
     const struct drape_contact *contact = drape_system_contact(s.sim->system);
-    const double stored = 10 * 0.04 * 4e-3 * drape_barrier_at(-1, DRAPE_BARRIER_GENTLE).b;
+    const double stored = 10 * 0.04 * 4e-3 * drape_barrier_at(-1, DRAPE_BARRIER_PARABOLA).b;
     double height = -4e-3;
     ck_assert_double_eq_tol(drape_sim_energy(s.sim).contact, stored, 1e-9 * stored);
     for (int k = 1; k <= 100; k++) {
@@ -113,7 +113,7 @@ START_TEST(stiffness_rises_where_gaps_cannot_shrink)
         at->x[i] = 1.5 * drape_contact_least_gap(contact);
     for (int k = 1; k <= 5; k++) {
         ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
-        ck_assert_double_eq(contact->press.factor, 1 << k);
+        ck_assert_double_eq(contact->stiffening.factor, 1 << k);
         drape_system_end_step(s.sim->system);
     }
     scene_close(&s);
@@ -176,7 +176,7 @@ START_TEST(a_checkpoint_keeps_it)
         const double half = inside ? 0.01 : 0.5, end = inside ? 0.1 : 0.7;
         scene_advance(&s[0], half);
         const struct drape_contact *contact = drape_system_contact(s[0].sim->system);
-        ck_assert(inside ? contact->inside.count > 0 : contact->press.factor > 1);
+        ck_assert(inside ? contact->inside.count > 0 : contact->stiffening.factor > 1);
         bytes saved = bytes_save(s[0].sim);
         ck_assert_int_eq(drape_sim_restore_from(s[1].sim, saved.data, saved.size), DRAPE_OK);
         free(saved.data);

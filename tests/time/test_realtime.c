@@ -4,7 +4,7 @@
  * Measured seconds are no basis for a test: budgets here are either never reached (an hour) or never kept
  * (a nanosecond); those in between are for the bench.
  */
-#include "contact/parts.h"
+#include "contact/contact_parts.h"
 #include "support/bytes.h"
 #include "support/scene.h"
 

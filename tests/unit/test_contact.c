@@ -49,7 +49,7 @@ static drape_gap gap_of(const setting *s)
 static double energy_of(const setting *s)
 {
     const drape_gap gap = gap_of(s);
-    return drape_contact_energy(&gap, &s->law);
+    return drape_law_energy(&gap, &s->law);
 }
 
 /* The force of the energy, the dissipative part of the normal force, friction of the whole normal force, and
@@ -66,7 +66,7 @@ static forces forces_of(const setting *s)
     memcpy(v, s->v, sizeof v);
     const drape_normal normal = drape_normal_at(&gap, &s->law, v);
     f.normal = drape_normal_force(&normal);
-    drape_contact_gradient(&gap, &s->law, f.elastic);
+    drape_law_gradient(&gap, &s->law, f.elastic);
     drape_restitution_force(&gap, &normal, f.restitution);
     drape_friction_force(&gap, &s->law, f.normal, v, f.friction, NULL);
     return f;
@@ -97,7 +97,7 @@ static void derive(const setting *s, derivatives *d)
     drape_pair_derivatives(&s->pair, &gap, &at, s->rest, &of_gap);
     memcpy(v, s->v, sizeof v);
     const drape_normal normal = drape_normal_at(&gap, &s->law, v);
-    drape_contact_hessian(&gap, &of_gap, &s->law, d->h);
+    drape_law_hessian(&gap, &of_gap, &s->law, d->h);
     drape_normal_derive(&gap, &of_gap, &s->law, v, &by_x);
     drape_normal_by_v(&gap, &normal, 1, d->normal[0]);
     drape_normal_add_by_x(&gap, &normal, &by_x, d->normal[1]);
@@ -327,19 +327,19 @@ START_TEST(test_bounded_barrier)
 END_TEST
 
 /* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
- * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_GENTLE on, so that a pair that
+ * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
  * comes out keeps its energy. */
 START_TEST(test_barrier)
 {
-    check_barrier(DRAPE_BARRIER_GENTLE);
+    check_barrier(DRAPE_BARRIER_PARABOLA);
     check_barrier(DRAPE_LEAST_GAP);
     ck_assert_double_eq_tol(drape_barrier_at(DRAPE_LEAST_GAP, DRAPE_LEAST_GAP).db * DRAPE_LEAST_GAP, -1,
                             0.02);
-    for (double s = DRAPE_BARRIER_GENTLE; s < 1; s += 1e-2) {
+    for (double s = DRAPE_BARRIER_PARABOLA; s < 1; s += 1e-2) {
         ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).b,
-                            drape_barrier_at(s, DRAPE_BARRIER_GENTLE).b);
+                            drape_barrier_at(s, DRAPE_BARRIER_PARABOLA).b);
         ck_assert_double_eq(drape_barrier_at(s, DRAPE_LEAST_GAP).db,
-                            drape_barrier_at(s, DRAPE_BARRIER_GENTLE).db);
+                            drape_barrier_at(s, DRAPE_BARRIER_PARABOLA).db);
     }
 }
 END_TEST

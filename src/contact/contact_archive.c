@@ -1,6 +1,6 @@
-/* checkpoint.c: contact in a checkpoint, and contact that goes on where other contact of the same cloth was.
- * See contact.h. */
-#include "contact/parts.h"
+/* contact_archive.c: contact in a checkpoint, and contact that continues from that of another sim of the same
+ * cloth. See contact.h. */
+#include "contact/contact_parts.h"
 
 #include "base/finite.h"
 #include "base/list.h"
@@ -48,8 +48,8 @@ static bool are_distances(const drape_contact *c)
     return true;
 }
 
-/* The active set at the beginning of the step depends on the positions alone, whatever the candidates;
- * lagged friction also on the velocities. */
+/* Lists the active set at the beginning of the step, which depends on the positions alone, and the lagged
+ * friction there, which also depends on the velocities. */
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -69,17 +69,17 @@ static drape_status restore(drape_contact *c)
     return status ? status : drape_contact_lag(c);
 }
 
-static void archive_press(drape_contact *c, drape_archive *a)
+static void archive_stiffness(drape_contact *c, drape_archive *a)
 {
-    drape_archive_double(a, &c->press.factor);
-    drape_archive_double(a, &c->press.widest);
-    drape_archive_double(a, &c->press.t);
+    drape_archive_double(a, &c->stiffening.factor);
+    drape_archive_double(a, &c->stiffening.largest_gap);
+    drape_archive_double(a, &c->stiffening.t);
     drape_archive_doubles(a, c->broad.distance, (size_t)c->model->collider_count);
 }
 
-static bool is_press(const drape_contact *c, drape_archive *a)
+static bool is_stiffness(const drape_contact *c, drape_archive *a)
 {
-    if (!(c->press.factor >= 1 && isfinite(c->press.factor) && isfinite(c->press.t)))
+    if (!(c->stiffening.factor >= 1 && isfinite(c->stiffening.factor) && isfinite(c->stiffening.t)))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a stiffness of contact below the scene's");
     else if (!are_distances(c))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an activation distance below the scene's");
@@ -105,7 +105,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
         drape_archive_double(a, &pose->t);
     }
     drape_inside_archive(&c->inside, a);
-    archive_press(c, a);
+    archive_stiffness(c, a);
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);
@@ -114,52 +114,27 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     if (!drape_all_finite(c->start, points) || !drape_all_finite(c->start_v, points) ||
         !are_finite(c->start_pose, c->model->collider_count))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
-    else if (is_press(c, a))
+    else if (is_stiffness(c, a))
         drape_archive_note(a, restore(c));
 }
 
-void drape_contact_archive_press(drape_contact *c, drape_archive *a)
+void drape_contact_archive_stiffness(drape_contact *c, drape_archive *a)
 {
     drape_archive_mark(a, "press");
-    archive_press(c, a);
-    if (!drape_archive_has_read(a) || !is_press(c, a))
+    archive_stiffness(c, a);
+    if (!drape_archive_has_read(a) || !is_stiffness(c, a))
         return;
     drape_candidates_forget(&c->step_candidates);
     drape_candidates_forget(&c->query_candidates);
     c->listed = false;
 }
 
-/* ---- Other contact goes on ---- */
-
-/* The number in `to` of a collider of `from`; -1: it is gone. */
-static int32_t collider_now(const drape_contact *to, const int32_t *before, int32_t collider)
-{
-    for (int32_t c = 0; c < to->model->collider_count; c++)
-        if (before[c] == collider)
-            return c;
-    return -1;
-}
-
-static int32_t first_point(const drape_contact *c, int32_t collider)
-{
-    int32_t first = c->model->node_count;
-    for (int32_t k = 0; k < collider; k++)
-        first += c->model->colliders[k].shape.point_count;
-    return first;
-}
-
-/* Whether the points of a collider are the same ones; *shift: what is added to their numbers. */
-static bool same_points(const drape_contact *to, int32_t now, const drape_contact *from, int32_t before,
-                        int32_t *shift)
-{
-    *shift = first_point(to, now) - first_point(from, before);
-    return to->model->colliders[now].shape.point_count == from->model->colliders[before].shape.point_count;
-}
+/* ---- Contact of another sim ---- */
 
 drape_status drape_contact_continue(drape_contact *to, const drape_contact *from, const int32_t *before)
 {
-    to->press = from->press;
-    to->press.work = 0;
+    to->stiffening = from->stiffening;
+    to->stiffening.work = 0;
     to->seconds = from->seconds;
     to->search_seconds = from->search_seconds;
     to->longest_path = from->longest_path;
@@ -168,20 +143,23 @@ drape_status drape_contact_continue(drape_contact *to, const drape_contact *from
             !(to->model->colliders[c].shape.distance > 0))
             to->broad.distance[c] = fmax(to->model->contact.distance, from->broad.distance[before[c]]);
     to->broad.rounding = from->broad.rounding;
-    /* Pairs that are left out, as those of a collider with another shape, count as new ones when the next
-     * step begins. */
+    /* Pairs of colliders that are gone or have another shape are left out: the next step finds them anew. */
     drape_status status = DRAPE_OK;
     for (int32_t i = 0; !status && i < from->inside.count; i++) {
         drape_pair_key key = from->inside.keys[i];
-        int32_t shift = 0;
-        if (key.collider >= 0) {
-            const int32_t now = collider_now(to, before, key.collider);
-            if (now < 0 || !same_points(to, now, from, key.collider, &shift))
+        const int32_t collider = key.collider, points = to->model->node_count;
+        int32_t now = 0, shift = 0; /* its number in `to`; what is added to the numbers of its points */
+        while (collider >= 0 && now < to->model->collider_count && before[now] != collider)
+            now++;
+        if (collider >= 0) {
+            if (now == to->model->collider_count || to->model->colliders[now].shape.point_count !=
+                                                        from->model->colliders[collider].shape.point_count)
                 continue;
             key.collider = now;
+            shift = to->broad.first_point[now] - from->broad.first_point[collider];
         }
         for (int a = 0; a < 4; a++)
-            key.node[a] += key.node[a] >= to->model->node_count ? shift : 0;
+            key.node[a] += key.node[a] >= points ? shift : 0;
         status = drape_inside_add(&to->inside, &key);
     }
     drape_inside_sort(&to->inside);

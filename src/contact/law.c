@@ -1,21 +1,21 @@
-/* force.c: see force.h. */
-#include "contact/force.h"
+/* law.c: see law.h. */
+#include "contact/law.h"
 
 #include "contact/barrier.h"
 
 #define D DRAPE_GAP_DOFS
 
-double drape_contact_energy(const drape_gap *gap, const drape_contact_law *law)
+double drape_law_energy(const drape_gap *gap, const drape_contact_law *law)
 {
     return gap->m * law->stiffness * law->distance * drape_barrier_at(gap->value / law->distance, law->low).b;
 }
 
-double drape_contact_normal_force(const drape_gap *gap, const drape_contact_law *law)
+double drape_law_normal_force(const drape_gap *gap, const drape_contact_law *law)
 {
     return -gap->m * law->stiffness * drape_barrier_at(gap->value / law->distance, law->low).db;
 }
 
-void drape_contact_gradient(const drape_gap *gap, const drape_contact_law *law, double *g)
+void drape_law_gradient(const drape_gap *gap, const drape_contact_law *law, double *g)
 {
     const drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
     const double e = law->stiffness * law->distance * b.b, de = law->stiffness * b.db;
@@ -24,8 +24,8 @@ void drape_contact_gradient(const drape_gap *gap, const drape_contact_law *law, 
                (gap->mollified ? e * gap->dm[i] : 0);
 }
 
-void drape_contact_hessian(const drape_gap *gap, const drape_gap_derivatives *derivatives,
-                           const drape_contact_law *law, double *h)
+void drape_law_hessian(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                       const drape_contact_law *law, double *h)
 {
     const int d = 3 * gap->closest.points;
     const drape_barrier b = drape_barrier_at(gap->value / law->distance, law->low);
@@ -45,7 +45,7 @@ void drape_contact_hessian(const drape_gap *gap, const drape_gap_derivatives *de
         }
 }
 
-void drape_contact_gauss_newton(const drape_gap *gap, const drape_contact_law *law, double *h)
+void drape_law_gauss_newton(const drape_gap *gap, const drape_contact_law *law, double *h)
 {
     const int d = 3 * gap->closest.points;
     const double second = /* m K/d b'' */

@@ -1,17 +1,14 @@
-/* check.c: checks whether the end of a step is allowed: penetration and collisions. See contact.h. */
-#include "contact/parts.h"
+/* step_check.c: checks whether the end of a step is allowed: penetration and collisions. See contact.h. */
+#include "contact/contact_parts.h"
 
 #include "base/clock.h"
 #include "base/pi.h"
 #include "base/reason.h"
 #include "base/vec3.h"
-#include "colliders/colliders.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
-
-#define PATH "fraction of the step before passing through"
 
 /* ---- Depth in a convex collider ---- */
 
@@ -38,8 +35,8 @@ static tangent tangent_at(const drape_collider *collider, const drape_collider_p
 }
 
 /* The smallest signed distance [m] between a and b or, if that is larger than `enough`, a value between
- * `enough` and it. By the cuts of two tangents, until the lower bound that they are is reached or rounding
- * leaves no place for another one between them. */
+ * `enough` and it. Two tangents intersect at a lower bound of it: the search ends when the distance there is
+ * this bound, or when rounding leaves no place between the two points. */
 static double depth_of_edge(const drape_collider *collider, const drape_collider_pose *pose, const double *a,
                             const double *b, double enough)
 {
@@ -83,7 +80,7 @@ static double depth_of_face(const drape_collider *collider, const drape_collider
 {
     const double golden = (sqrt(5) - 1) / 2;
     double low = 0, high = 1, d[2], sides[3], length = 0;
-    /* It cannot be that deep if a tangent plane at some corner is above `enough` on the whole triangle. */
+    /* The whole triangle is above `enough` if the tangent plane at some corner is. */
     for (int i = 0; i < 3; i++) {
         double n[3], to[3], distance = drape_collider_distance(collider, pose, corner[i], n, NULL),
                             least = distance;
@@ -113,14 +110,18 @@ static double depth_of_face(const drape_collider *collider, const drape_collider
     return least;
 }
 
-/* ---- Gaps ---- */
-
-/* The pair that refuses a step may be one to exempt. */
-static void refuse(drape_contact *c, const drape_pair *pair)
+/* The smallest distance of an edge (two nodes) or a face (three) of cloth; `enough` as in depth_of_edge. */
+static double depth_of(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
+                       const int32_t *node, int nodes, double enough)
 {
-    c->refused = true;
-    c->refusing = *pair;
+    const double *corner[3];
+    for (int a = 0; a < nodes; a++)
+        corner[a] = x + 3 * (size_t)node[a];
+    return nodes == 2 ? depth_of_edge(collider, pose, corner[0], corner[1], enough)
+                      : depth_of_face(collider, pose, corner, enough);
 }
+
+/* ---- Refusals ---- */
 
 static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *pair, const char *what,
                                       double value, double limit)
@@ -140,6 +141,27 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
+/* What a check says: which reason, and where. */
+typedef struct verdict {
+    const char **reason;
+    drape_diagnostic *diagnostic;
+} verdict;
+
+/* Refuses a step because of a pair, which may be one to exempt. */
+static drape_status refuse(drape_contact *c, const drape_pair *pair, const verdict *to, drape_reason reason,
+                           double value, double limit)
+{
+    c->refused = true;
+    c->refusing = *pair;
+    *to->reason = drape_reason_name(reason);
+    *to->diagnostic = diagnostic_of(
+        c, pair, reason == DRAPE_REASON_COLLISION ? "fraction of the step before passing through" : "gap [m]",
+        value, limit);
+    return DRAPE_RETRY_REJECTED;
+}
+
+/* ---- The end of a step ---- */
+
 /* The gap that a pair may end with. If it began below the least gap it may not come nearer, but for rounding,
  * by which it may not lose its side however many steps there are. */
 static double allowed(double least, double before, double rounding)
@@ -153,9 +175,10 @@ static double allowed(double least, double before, double rounding)
 /* Finds the pair whose gap is below what it may end with by most. Where several features of a collider are
  * inside (only gaps with a collider can be negative), pushing one out can push another one in: none may be
  * deeper than the deepest of them was. */
-static drape_status check_gaps(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
+static drape_status check_gaps(drape_contact *c, const verdict *to)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
+    drape_status status = DRAPE_OK;
     double excess = 0;
     for (int32_t i = 0; i < c->active.near_count; i++) {
         const drape_pair *pair = &c->active.near[i].pair;
@@ -170,92 +193,15 @@ static drape_status check_gaps(drape_contact *c, const char **reason, drape_diag
         if (gap >= least || least - gap < excess)
             continue;
         excess = least - gap;
-        refuse(c, pair);
-        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap, least);
+        status = refuse(c, pair, to, DRAPE_REASON_PENETRATION, gap, least);
     }
-    *reason = excess > 0 ? drape_reason_name(DRAPE_REASON_PENETRATION) : *reason;
-    return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
-}
-
-/* How far points may stray from the straight in a piece of the path, in margins of the candidates. */
-#define MAX_STRAY 0.25
-
-/* A piece of the path, on which nodes move straight, and colliders turn about one axis while their pivots
- * move straight: c->swing. */
-typedef struct piece {
-    drape_straight_path path;
-} piece;
-
-/* The end of the piece that begins at `at`, at most t. */
-static double end_of_piece(const drape_contact *c, double at, double t)
-{
-    const double end = drape_motion_next_kink(c->motion, at, t);
-    double pieces = 1;
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        const double angle = drape_motion_turns_collider(c->motion, k)
-                                 ? drape_motion_fastest_spin(c->motion, k, at, end) * (end - at)
-                                 : 0; /* if it turned all the time; it is asked again for the rest */
-        const double stray = drape_contact_stray(&c->model->colliders[k], angle);
-        /* at most a quarter turn: between two poses, a collider turns by the smaller angle */
-        pieces =
-            fmax(pieces,
-                 ceil(fmax(angle / (DRAPE_PI / 2), sqrt(stray / (MAX_STRAY * c->step_candidates.margin)))));
-    }
-    return pieces > 1 ? at + (end - at) / pieces : end;
-}
-
-static drape_status check_surfaces(drape_contact *c, const piece *p, const char **reason,
-                                   drape_diagnostic *diagnostic)
-{
-    const drape_keep keep = drape_contact_keep_step(c);
-    const double least = drape_contact_least_gap(c);
-    for (int32_t k = 0; k < c->model->collider_count; k++) {
-        if (!c->model->colliders[k].ops->smooth)
-            continue;
-        for (int32_t i = 0; i < c->model->free_count; i++) {
-            const int32_t node = c->model->node_of_free[i];
-            const drape_configuration *from = &p->path.end[0], *to = &p->path.end[1];
-            /* Whether a node that moves straight in the coordinates of a collider surely keeps the least
-             * gap. */
-            bool away = !c->swing[k].turns;
-            for (int end = 0; away && end < 2; end++) {
-                const drape_configuration *at = &p->path.end[end];
-                double own[3];
-                drape_pose_own(&at->pose[k], at->x + 3 * (size_t)node, own);
-                away = drape_distant_keeps(&c->broad.distant, k, node, own, least);
-            }
-            if (away || drape_contact_lets_in(c, k, &node, 1))
-                continue;
-            const double fraction =
-                drape_contact_march(c, k, &from->pose[k], &to->pose[k], &c->swing[k],
-                                    from->x + 3 * (size_t)node, to->x + 3 * (size_t)node, &keep);
-            if (fraction >= 1)
-                continue;
-            const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
-            refuse(c, &pair);
-            *reason = drape_reason_name(DRAPE_REASON_COLLISION);
-            *diagnostic = diagnostic_of(c, &pair, PATH, fraction, 1);
-            return DRAPE_RETRY_REJECTED;
-        }
-    }
-    return DRAPE_OK;
-}
-
-/* The smallest distance of an edge (two nodes) or a face (three) of cloth; `enough` as in depth_of_edge. */
-static double depth_of(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
-                       const int32_t *node, int nodes, double enough)
-{
-    const double *corner[3];
-    for (int a = 0; a < nodes; a++)
-        corner[a] = x + 3 * (size_t)node[a];
-    return nodes == 2 ? depth_of_edge(collider, pose, corner[0], corner[1], enough)
-                      : depth_of_face(collider, pose, corner, enough);
+    return status;
 }
 
 /* Checks edges or faces of cloth against the curved surfaces of shapes whose features lie inside these
  * surfaces (inscribed). A piece that began nearer than the least gap, or inside, may not come nearer. */
 static drape_status check_inscribed(drape_contact *c, const int32_t *node, int nodes, int32_t count,
-                                    const char **reason, drape_diagnostic *diagnostic)
+                                    const verdict *to)
 {
     const double least = drape_contact_least_gap(c);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
@@ -265,85 +211,118 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
             const double depth = depth_of(collider, &c->pose[k], c->x, n, nodes, least);
             if (depth >= least || drape_contact_lets_in(c, k, n, nodes))
                 continue;
-            const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
-            const double min_gap = allowed(least, before, c->broad.rounding);
-            if (depth >= min_gap)
-                continue;
+            const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY),
+                         min_gap = allowed(least, before, c->broad.rounding);
             const drape_pair pair = {
                 .kind = DRAPE_PAIR_SEGMENTS, .collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
-            refuse(c, &pair);
-            *reason = drape_reason_name(DRAPE_REASON_PENETRATION);
-            *diagnostic = diagnostic_of(c, &pair, "gap [m]", depth, min_gap);
-            return DRAPE_RETRY_REJECTED;
+            if (depth < min_gap)
+                return refuse(c, &pair, to, DRAPE_REASON_PENETRATION, depth, min_gap);
         }
     }
     return DRAPE_OK;
 }
 
-static drape_status check_features(drape_contact *c, const piece *p, const char **reason,
-                                   drape_diagnostic *diagnostic)
+/* ---- The path of a step ---- */
+
+/* How far points may stray from the straight in a piece of the path, in margins of the candidates. */
+#define MAX_STRAY 0.25
+
+/* The end of the piece of the path that begins at `at`, at most t. On a piece nodes move straight, and
+ * colliders turn about one axis while their pivots move straight (c->swing). */
+static double end_of_piece(const drape_contact *c, double at, double t)
+{
+    const double end = drape_motion_next_kink(c->motion, at, t);
+    double pieces = 1;
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
+        const double angle = drape_motion_turns_collider(c->motion, k)
+                                 ? drape_motion_fastest_spin(c->motion, k, at, end) * (end - at)
+                                 : 0; /* if it turned all the time; the next piece is computed anew */
+        const double stray = drape_contact_stray(&c->model->colliders[k], angle);
+        /* at most a quarter turn: between two poses, a collider turns by the smaller angle */
+        pieces =
+            fmax(pieces,
+                 ceil(fmax(angle / (DRAPE_PI / 2), sqrt(stray / (MAX_STRAY * c->step_candidates.margin)))));
+    }
+    return pieces > 1 ? at + (end - at) / pieces : end;
+}
+
+/* Nodes and smooth surfaces on a piece of the path. */
+static drape_status check_surfaces(drape_contact *c, const drape_straight_path *piece, const verdict *to)
+{
+    const drape_configuration *from = &piece->end[0], *until = &piece->end[1];
+    const drape_keep keep = drape_contact_keep_step(c);
+    const double least = drape_contact_least_gap(c);
+    for (int32_t k = 0; k < c->model->collider_count; k++)
+        for (int32_t i = 0; c->model->colliders[k].ops->smooth && i < c->model->free_count; i++) {
+            const int32_t node = c->model->node_of_free[i];
+            const size_t at = 3 * (size_t)node;
+            /* A node that moves straight in the coordinates of a collider keeps the least gap on its path if
+             * it surely keeps it at both ends. */
+            bool away = !c->swing[k].turns;
+            for (int end = 0; away && end < 2; end++) {
+                double own[3];
+                drape_pose_own(&piece->end[end].pose[k], piece->end[end].x + at, own);
+                away = drape_distant_keeps(&c->broad.distant, k, node, own, least);
+            }
+            if (away || drape_contact_lets_in(c, k, &node, 1))
+                continue;
+            const double fraction = drape_contact_march(c, k, &from->pose[k], &until->pose[k], &c->swing[k],
+                                                        from->x + at, until->x + at, &keep);
+            const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
+            if (fraction < 1)
+                return refuse(c, &pair, to, DRAPE_REASON_COLLISION, fraction, 1);
+        }
+    return DRAPE_OK;
+}
+
+/* Pairs of features on a piece of the path. */
+static drape_status check_features(drape_contact *c, const drape_straight_path *piece, const verdict *to)
 {
     const drape_keep keep = drape_contact_keep_step(c);
     drape_pair limiting;
     const double fraction =
-        drape_contact_free_fraction(c, &p->path, c->swing, &keep, NULL, NULL, NULL, NULL, &limiting);
-    if (fraction >= 1)
-        return DRAPE_OK;
-    refuse(c, &limiting);
-    *reason = drape_reason_name(DRAPE_REASON_COLLISION);
-    *diagnostic = diagnostic_of(c, &limiting, PATH, fraction, 1);
-    return DRAPE_RETRY_REJECTED;
-}
-
-/* The positions on the path at time t: free nodes straight between both ends, pins and colliders where their
- * tracks are. */
-static void place_on_path(const drape_contact *c, double t, double end, double *x, drape_collider_pose *pose)
-{
-    const double share = (t - c->start_t) / (end - c->start_t);
-    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
-        x[i] = (1 - share) * c->start[i] + share * c->x[i];
-    drape_motion_place_pins(c->motion, t, x);
-    drape_contact_poses(c, t, pose);
-    drape_contact_fill(c, x, pose, x);
+        drape_contact_free_fraction(c, piece, c->swing, &keep, NULL, NULL, NULL, NULL, &limiting);
+    return fraction < 1 ? refuse(c, &limiting, to, DRAPE_REASON_COLLISION, fraction, 1) : DRAPE_OK;
 }
 
 /* Checks the path from the beginning of the step to where contact is evaluated, at time t: piece by piece
- * between the kinks of tracks, in which no collider turns far. */
-static drape_status check_path(drape_contact *c, double t, bool surfaces, const char **reason,
-                               drape_diagnostic *diagnostic)
+ * between the kinks of tracks, in which no collider turns far. Free nodes go straight from one end to the
+ * other, pins and colliders follow their tracks. */
+static drape_status check_path(drape_contact *c, double t, bool surfaces, const verdict *to)
 {
     double *const x[] = {c->from, c->to}, at = c->start_t;
     drape_collider_pose *const pose[] = {c->path_pose, c->kink_pose};
-    piece p = {.path.end[1] = {.model = c->model, .x = c->start, .pose = c->start_pose}};
+    drape_straight_path piece = {.end[1] = {.model = c->model, .x = c->start, .pose = c->start_pose}};
     drape_status status = DRAPE_OK;
-    bool end = false;
-    for (int i = 0; !status && !end; i = !i) {
-        p.path.end[0] = p.path.end[1];
+    bool last = false;
+    for (int i = 0; !status && !last; i = !i) {
+        piece.end[0] = piece.end[1];
         at = end_of_piece(c, at, t);
-        end = !(at < t);
-        if (!end)
-            place_on_path(c, at, t, x[i], pose[i]);
-        p.path.end[1] =
-            (drape_configuration){.model = c->model, .x = end ? c->x : x[i], .pose = end ? c->pose : pose[i]};
-        const drape_configuration *ends = p.path.end;
+        last = !(at < t);
+        if (!last) {
+            const double share = (at - c->start_t) / (t - c->start_t);
+            for (size_t k = 0; k < 3 * (size_t)c->model->node_count; k++)
+                x[i][k] = (1 - share) * c->start[k] + share * c->x[k];
+            drape_motion_place_pins(c->motion, at, x[i]);
+            drape_contact_poses(c, at, pose[i]);
+            drape_contact_fill(c, x[i], pose[i], x[i]);
+        }
+        piece.end[1] = (drape_configuration){
+            .model = c->model, .x = last ? c->x : x[i], .pose = last ? c->pose : pose[i]};
         for (int32_t k = 0; k < c->model->collider_count; k++) {
-            drape_swing_between(&ends[0].pose[k], &ends[1].pose[k], c->model->colliders[k].pivot,
+            drape_swing_between(&piece.end[0].pose[k], &piece.end[1].pose[k], c->model->colliders[k].pivot,
                                 &c->swing[k]);
-            /* the points of one that deforms move straight in space between the pieces, which are short */
+            /* the points of a collider that deforms move straight in space on a piece, which is short */
             c->swing[k].turns = c->swing[k].turns && !c->deformed[k];
         }
-        status = surfaces ? check_surfaces(c, &p, reason, diagnostic) : DRAPE_OK;
+        status = surfaces ? check_surfaces(c, &piece, to) : DRAPE_OK;
         if (!status)
-            status = check_features(c, &p, reason, diagnostic);
+            status = check_features(c, &piece, to);
     }
     return status;
 }
 
-drape_keep drape_contact_keep_step(const drape_contact *c)
-{
-    return (drape_keep){
-        .rounding = c->broad.rounding, .least = DRAPE_KEPT_GAP, .below = DRAPE_KEPT_GAP, .core = true};
-}
+/* ---- Checks ---- */
 
 static drape_status update_at(drape_contact *c, const double *x, double t)
 {
@@ -354,9 +333,9 @@ bool drape_contact_crosses(drape_contact *c, const double *x, double t, const ch
                            drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
+    const verdict to = {reason, diagnostic};
     c->out_of_memory = update_at(c, x, t) != DRAPE_OK;
-    const bool crosses =
-        c->out_of_memory || check_gaps(c, reason, diagnostic) || check_path(c, t, false, reason, diagnostic);
+    const bool crosses = c->out_of_memory || check_gaps(c, &to) || check_path(c, t, false, &to);
     c->seconds += drape_clock_seconds() - start;
     return crosses;
 }
@@ -365,15 +344,17 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
                                  drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
+    const drape_model *m = c->model;
+    const verdict to = {reason, diagnostic};
     drape_status status = update_at(c, x, t);
     if (!status)
-        status = check_gaps(c, reason, diagnostic);
+        status = check_gaps(c, &to);
     if (!status)
-        status = check_inscribed(c, c->model->edge, 2, c->model->edge_count, reason, diagnostic);
+        status = check_inscribed(c, m->edge, 2, m->edge_count, &to);
     if (!status)
-        status = check_inscribed(c, c->model->triangle, 3, c->model->triangle_count, reason, diagnostic);
+        status = check_inscribed(c, m->triangle, 3, m->triangle_count, &to);
     if (!status)
-        status = check_path(c, t, true, reason, diagnostic);
+        status = check_path(c, t, true, &to);
     if (!status)
         status = drape_contact_take_failure(c);
     c->seconds += drape_clock_seconds() - start;
