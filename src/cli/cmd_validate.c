@@ -1,6 +1,6 @@
 /* cmd_validate.c: `drape validate`: measured against expected values, as a table, as Markdown, as JSON. */
 #include "cli/cli.h"
-#include "lab/validate.h"
+#include "lab/reference.h"
 
 #include "base/clock.h"
 #include "io/export.h"

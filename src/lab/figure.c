@@ -2,7 +2,7 @@
 #include "lab/figure.h"
 
 #include "base/hash.h"
-#include "lab/text.h"
+#include "lab/engine_output.h"
 
 #include <cairo-pdf.h>
 #include <cairo-svg.h>

@@ -9,7 +9,7 @@
 #ifndef DRAPE_LAB_FIGURE_H
 #define DRAPE_LAB_FIGURE_H
 
-#include "lab/lab.h"
+#include "lab/engine.h"
 
 #define LAB_MAX_ENTRIES  64
 #define LAB_MAX_VARIANTS 8  /* of the integrators of a figure */

@@ -3,7 +3,7 @@
 #define DRAPE_LAB_SHEET_H
 
 #include "drape/lab.h"
-#include "lab/validate.h"
+#include "lab/reference.h"
 
 /* A scene of one cloth. Members that are 0 have the defaults given here, or are not in the scene. Texts are
  * JSON, in which ' stands for ", and go into the text of the scene as they are. */

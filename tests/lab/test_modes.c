@@ -3,8 +3,8 @@
  * which strips buckle are references of `drape validate`. */
 #include "drape/lab.h"
 #include "lab/eigen.h"
+#include "lab/reference.h"
 #include "lab/tangent.h"
-#include "lab/validate.h"
 #include "support/failing_allocator.h"
 #include "support/scene.h"
 

@@ -2,8 +2,8 @@
  * with GSL, against digits from other sources; and that a reference can fail. `drape validate` runs all of
  * them. */
 #include "compile/fabrics.h"
+#include "lab/reference.h"
 #include "lab/sheet.h"
-#include "lab/validate.h"
 #include "support/sample.h"
 #include "support/suite.h"
 

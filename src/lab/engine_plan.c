@@ -1,5 +1,5 @@
 /*
- * plan.c: see lab.h.
+ * engine_plan.c: see engine.h.
  *
  * The sample is a Weyl sequence of the golden ratio over the numbers of the cases: its first points are
  * spread as evenly as any number of points can be (Knuth, The Art of Computer Programming 3, 6.4), also over
@@ -10,10 +10,10 @@
  * fewer than two cases are in the sample are one. The interval is Student's, and no total is less than what
  * the sample took.
  */
-#include "lab/lab.h"
+#include "lab/engine.h"
 
+#include "lab/engine_output.h"
 #include "lab/series.h"
-#include "lab/text.h"
 
 #include <math.h>
 #include <stdlib.h>

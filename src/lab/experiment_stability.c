@@ -6,9 +6,9 @@
  * drawn over the map.
  */
 #include "base/retired.h"
+#include "lab/engine.h"
+#include "lab/engine_output.h"
 #include "lab/figure.h"
-#include "lab/lab.h"
-#include "lab/text.h"
 #include "sim/warnings.h"
 
 #include <math.h>

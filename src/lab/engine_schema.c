@@ -1,5 +1,5 @@
-/* schema.c: see lab.h, which has the form of both files. */
-#include "lab/lab.h"
+/* engine_schema.c: see engine.h, which has the form of both files. */
+#include "lab/engine.h"
 
 #include <stdarg.h>
 #include <string.h>

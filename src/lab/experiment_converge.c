@@ -8,8 +8,8 @@
  * neighbours agree. Over rtol the slope is that of the error control, 1 where the error is proportional to
  * the tolerance; a method that chooses its order takes another one at another rtol, and no line is fitted.
  */
+#include "lab/engine_output.h"
 #include "lab/series.h"
-#include "lab/text.h"
 #include "model/scene.h"
 
 #include <math.h>

@@ -4,8 +4,8 @@
  * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
  */
 #include "base/clock.h"
+#include "lab/engine_output.h"
 #include "lab/series.h"
-#include "lab/text.h"
 #include "model/model.h"
 #include "solvers/linear.h"
 

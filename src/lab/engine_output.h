@@ -1,8 +1,8 @@
-/* text.h: the files and the page of a report, and units for its figures. */
-#ifndef DRAPE_LAB_TEXT_H
-#define DRAPE_LAB_TEXT_H
+/* engine_output.h: the files and the page of a report, and units for its figures. */
+#ifndef DRAPE_LAB_ENGINE_OUTPUT_H
+#define DRAPE_LAB_ENGINE_OUTPUT_H
 
-#include "lab/lab.h"
+#include "lab/engine.h"
 
 /* Writes a text as a file of l->folder, atomically. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size);

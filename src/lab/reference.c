@@ -1,12 +1,12 @@
-/* validate.c: runs the cases of a reference, and keeps them as lines; see validate.h. */
-#include "lab/validate.h"
+/* reference.c: runs the cases of a reference, and keeps them as lines; see reference.h. */
+#include "lab/reference.h"
 
 #include "base/clock.h"
 #include "base/hash.h"
 #include "io/export.h"
-#include "lab/lab.h"
+#include "lab/engine.h"
+#include "lab/engine_output.h"
 #include "lab/sheet.h"
-#include "lab/text.h"
 
 #include <gsl/gsl_errno.h>
 #include <math.h>

@@ -1,5 +1,5 @@
-/* text.c: see text.h. */
-#include "lab/text.h"
+/* engine_output.c: see engine_output.h. */
+#include "lab/engine_output.h"
 
 #include "base/json_read.h"
 #include "base/param.h"

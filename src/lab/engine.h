@@ -1,6 +1,6 @@
 /*
- * lab.h: what the experiments share. An experiment plans cases, prepares what all of them are compared with,
- * and reports. Cases and results are JSON from the start, as in the files: a report is a function of
+ * engine.h: what the experiments share. An experiment plans cases, prepares what all of them are compared
+ * with, and reports. Cases and results are JSON from the start, as in the files: a report is a function of
  * experiment.json and of the lines, so results of other machines or earlier runs need no exception.
  *
  *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments",
@@ -10,8 +10,8 @@
  *                       "same_as": N if the integrator ignores all that distinguishes it from case N
  *     cases.jsonl       a result a line: {"case": N, "tags": {...}, "status": ..., what was measured}
  */
-#ifndef DRAPE_LAB_LAB_H
-#define DRAPE_LAB_LAB_H
+#ifndef DRAPE_LAB_ENGINE_H
+#define DRAPE_LAB_ENGINE_H
 
 #include "base/arena.h"
 #include "base/registry.h"
@@ -136,7 +136,7 @@ bool lab_has_param(const drape_entry *entry, const char *name);
  * parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
-/* ---- run.c: a case, the scene with its settings, simulated and measured ---- */
+/* ---- engine_case.c: a case, the scene with its settings, simulated and measured ---- */
 
 /* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile;
  * *scene is to be destroyed in any case. */
@@ -166,8 +166,7 @@ drape_status lab_try(drape_context *ctx, const lab_request *request);
  * (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
 
-/* ---- plan.c: what a sweep will take, from a sample of its cases: CPU time, time on free cores, memory, disk
- * ---- */
+/* ---- engine_plan.c: what a sweep will take, from a sample of its cases ---- */
 
 /* The cases of this shard that are run for a plan of def->plan cases, spread evenly over all of them, in the
  * order in which they are to be run: at most def->plan, and the same ones in every call. cases: room for
@@ -180,11 +179,10 @@ drape_status lab_write_plan(lab *l);
 /* Whether a case is run by this shard: it is its own, and not the same as another one. */
 bool lab_is_ours(const lab *l, size_t i);
 
-/* ---- schema.c: experiment.json and cases.jsonl of a stranger, checked once, before anything of them is used
- * ---- */
+/* ---- engine_schema.c: checks of experiment.json and cases.jsonl, which any program may have written ---- */
 
 /* Checks the content of experiment.json; file: its path, for the message. From then on its members have
- * the types of lab.h, tags and names no control characters, same_as is an earlier case that has a result
+ * the types above, tags and names no control characters, same_as is an earlier case that has a result
  * of its own, and the cases of a series stand side by side. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
 drape_status lab_check_about(drape_context *ctx, const char *file, json_t *about);
 

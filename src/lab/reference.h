@@ -1,6 +1,6 @@
-/* validate.h: physics references: scenes whose outcome is known, and what Drape makes of them. */
-#ifndef DRAPE_LAB_VALIDATE_H
-#define DRAPE_LAB_VALIDATE_H
+/* reference.h: physics references: scenes whose outcome is known, and what Drape makes of them. */
+#ifndef DRAPE_LAB_REFERENCE_H
+#define DRAPE_LAB_REFERENCE_H
 
 #include "base/arena.h"
 #include "base/registry.h"

@@ -1,5 +1,5 @@
-/* run.c: see lab.h. */
-#include "lab/lab.h"
+/* engine_case.c: see engine.h. */
+#include "lab/engine.h"
 
 #include "base/clock.h"
 #include "base/hash.h"

@@ -1,5 +1,5 @@
 /*
- * experiment.c: an experiment from its def to its report, and the merging of shards. Its cases are run by
+ * engine.c: an experiment from its def to its report, and the merging of shards. Its cases are run by
  * several threads into a file of lines. A case that has a line is not run again; a line that a kill cut short
  * is dropped, and its case is run again.
  */
@@ -10,8 +10,8 @@
 #include "base/json_read.h"
 #include "base/param.h"
 #include "io/export.h"
-#include "lab/lab.h"
-#include "lab/text.h"
+#include "lab/engine.h"
+#include "lab/engine_output.h"
 
 #include <dirent.h>
 #include <errno.h>
