@@ -1,6 +1,8 @@
 /* eigen.c: see eigen.h. */
 #include "lab/eigen.h"
 
+#include "lab/tangent.h"
+
 #include <arpack.h>
 #include <limits.h>
 #include <math.h>
@@ -128,14 +130,9 @@ drape_status lab_eigen(drape_context *ctx, const lab_operator *op, const lab_kno
     s.taken = drape_arena_take(&arena, m, sizeof *s.taken);
     drape_status status = drape_arena_status(&arena);
     if (!status) {
-        /* The start: numbers between -1 and 1 without any symmetry that a mode might have, Knuth's linear
-         * congruential sequence. Another one for each number of known vectors, since the last search may
-         * have begun without a part of what it missed. */
-        uint64_t state = 1 + (uint64_t)s.known->count;
-        for (int64_t i = 0; i < s.n; i++) {
-            state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-            s.residual[i] = (double)(state >> 11) / 4503599627370496.0 - 1;
-        }
+        /* Another start vector for each number of known vectors: that of the last search may have lacked the
+         * part of what it missed. */
+        lab_tangent_noise(1 + (uint64_t)s.known->count, s.residual, n);
         leave_known(&s, s.residual);
         pthread_mutex_lock(&arpack_mutex);
         status = iterate(ctx, &s, parameters, pointers);

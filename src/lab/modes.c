@@ -23,7 +23,6 @@
 #include "lab/eigen.h"
 #include "lab/tangent.h"
 #include "solvers/inertia.h"
-#include "solvers/linear.h"
 
 #include <float.h>
 #include <math.h>
@@ -50,18 +49,14 @@ typedef struct eigenpair {
 
 typedef struct problem {
     drape_context *ctx;
-    drape_arena arena;
-    lab_tangent tangent;
+    lab_tangent tangent; /* its arena has all arrays */
     bool buckling;
     int64_t n;
-    double shift;    /* s [1/s2]; f0 */
-    double *slope;   /* K'; NULL: vibrations */
-    double *shifted; /* S, or K */
-    double *scratch; /* (n) */
-    double stiffest; /* [1/s2] the largest diagonal entry of M^-1 K */
-    const drape_linear_ops *solver;
-    void *factors;
-    drape_arena factor_arena;
+    double shift;        /* s [1/s2]; f0 */
+    double *slope;       /* K'; NULL: vibrations */
+    double *shifted;     /* S, or K */
+    double *scratch;     /* (n) */
+    double stiffest;     /* [1/s2] the largest diagonal entry of M^-1 K */
     int32_t count, room; /* pairs; room for them */
     eigenpair *pairs;    /* in descending order of op, that is ascending order of the value */
     double *vector;      /* (room x n) */
@@ -96,18 +91,12 @@ static drape_status apply(void *user, const double *x, double *y)
         multiply_masses(p, x, p->scratch);
     if (drape_check_cancel(p->ctx))
         return DRAPE_E_STOPPED;
-    return p->solver->solve(p->factors, p->scratch, y)
+    return lab_tangent_solve(&p->tangent, p->scratch, y)
                ? drape_fail(p->ctx, DRAPE_E_SOLVER, "a shifted stiffness cannot be solved with")
                : DRAPE_OK;
 }
 
 /* ---- Factors ---- */
-
-/* Factors the shifted matrix if it is positive definite. */
-static drape_status factor(problem *p, bool *definite)
-{
-    return lab_tangent_factor_definite(&p->tangent, p->solver, p->factors, p->shifted, definite);
-}
 
 /* Lowers the shift until it is below all eigenvalues, so that none of them is passed by. */
 static drape_status factor_below_all(problem *p)
@@ -118,7 +107,7 @@ static drape_status factor_below_all(problem *p)
     for (int i = 0; !status && !definite && i < MAX_SHIFTS; i++) {
         p->shift *= i > 0 ? SHIFT_STEP : 1;
         lab_tangent_shift(&p->tangent, -p->shift, NULL, p->shifted);
-        status = factor(p, &definite);
+        status = lab_tangent_factor_definite(&p->tangent, p->shifted, &definite);
     }
     return status || definite
                ? status
@@ -130,14 +119,14 @@ static drape_status prepare_buckling(problem *p)
     const size_t n = (size_t)p->n;
     int64_t negative;
     bool definite = false, known;
-    double *load = drape_arena_take(&p->arena, n, sizeof *load);
-    double *u = drape_arena_take(&p->arena, n, sizeof *u);
-    p->slope = drape_arena_take(&p->arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->slope);
-    if (drape_arena_status(&p->arena))
+    double *load = drape_arena_take(&p->tangent.arena, n, sizeof *load);
+    double *u = drape_arena_take(&p->tangent.arena, n, sizeof *u);
+    p->slope = drape_arena_take(&p->tangent.arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->slope);
+    if (drape_arena_status(&p->tangent.arena))
         return DRAPE_E_MEMORY;
     p->shift = p->tangent.factor;
     lab_tangent_shift(&p->tangent, 0, NULL, p->shifted);
-    drape_status status = factor(p, &definite);
+    drape_status status = lab_tangent_factor_definite(&p->tangent, p->shifted, &definite);
     if (!status && !definite)
         status = drape_inertia(p->ctx, p->tangent.pattern, p->shifted, NULL, &negative, &known);
     if (status)
@@ -151,7 +140,7 @@ static drape_status prepare_buckling(problem *p)
                     "held and has a stiffness against every motion (%lld negative pivots)",
             (long long)negative);
     lab_tangent_evaluate(&p->tangent, drape_sim_state(p->tangent.sim)->x, p->shift, NULL, load, NULL);
-    if (p->solver->solve(p->factors, load, u))
+    if (lab_tangent_solve(&p->tangent, load, u))
         return drape_fail(p->ctx, DRAPE_E_SOLVER, "the stiffness cannot be solved with");
     for (size_t i = 0; i < n; i++)
         u[i] = -u[i];
@@ -172,13 +161,13 @@ static drape_status search(problem *p, int32_t wanted)
         return DRAPE_OK;
     const size_t n = (size_t)p->n, room = (size_t)(p->count + wanted);
     if (p->room < (int32_t)room) {
-        p->vector = drape_arena_resize(&p->arena, p->vector, room * n, sizeof *p->vector);
-        p->product = drape_arena_resize(&p->arena, p->product, room * n, sizeof *p->product);
-        p->pairs = drape_arena_resize(&p->arena, p->pairs, room, sizeof *p->pairs);
+        p->vector = drape_arena_resize(&p->tangent.arena, p->vector, room * n, sizeof *p->vector);
+        p->product = drape_arena_resize(&p->tangent.arena, p->product, room * n, sizeof *p->product);
+        p->pairs = drape_arena_resize(&p->tangent.arena, p->pairs, room, sizeof *p->pairs);
         p->room = (int32_t)room;
     }
-    double *value = drape_arena_take(&p->arena, (size_t)wanted, sizeof *value);
-    drape_status status = drape_arena_status(&p->arena);
+    double *value = drape_arena_take(&p->tangent.arena, (size_t)wanted, sizeof *value);
+    drape_status status = drape_arena_status(&p->tangent.arena);
     if (status)
         return status;
     const lab_known known = {p->count, p->vector, p->product};
@@ -193,7 +182,7 @@ static drape_status search(problem *p, int32_t wanted)
         p->pairs[at] = (eigenpair){value[k], p->count};
         p->count++;
     }
-    drape_arena_release(&p->arena, value);
+    drape_arena_release(&p->tangent.arena, value);
     return status;
 }
 
@@ -334,7 +323,7 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
     mode->value = p->shift + 1 / pair->op;
     /* For OP symmetric in B there is an eigenvalue within |OP u - op u| of op, in the norm of B with |u| = 1;
      * inverse: relative to op. */
-    double *y = drape_arena_take(&p->arena, 2 * (size_t)p->n, sizeof *y), sum = 0;
+    double *y = drape_arena_take(&p->tangent.arena, 2 * (size_t)p->n, sizeof *y), sum = 0;
     drape_status status = y ? apply(p, u, y) : DRAPE_E_MEMORY;
     if (!status) {
         for (int64_t i = 0; i < p->n; i++)
@@ -344,7 +333,7 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
             sum += y[i] * y[p->n + i];
         inverse = sqrt(fmax(0, sum)) / pair->op;
     }
-    drape_arena_release(&p->arena, y);
+    drape_arena_release(&p->tangent.arena, y);
     if (status)
         return status;
     for (int64_t i = 0; i < p->n; i++)
@@ -420,19 +409,18 @@ static drape_status fill(problem *p, int32_t count, int64_t below, drape_modes *
 static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *def, drape_modes *out)
 {
     int64_t below = 0;
-    drape_status status =
-        lab_tangent_open(&p->arena, sim, def->buckling ? def->load_factor : 1, true, &p->tangent);
+    drape_status status = lab_tangent_open(sim, def->buckling ? def->load_factor : 1, true, &p->tangent);
     if (status)
         return status;
     p->n = p->tangent.pattern->n;
-    p->solver = drape_linear_best(p->n);
     if (def->count > p->n - 1)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
                           "count = %d; with %lld degrees of freedom there are at most %lld modes to find",
                           (int)def->count, (long long)p->n, (long long)p->n - 1);
-    p->shifted = drape_arena_take(&p->arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->shifted);
-    p->scratch = drape_arena_take(&p->arena, (size_t)p->n, sizeof *p->scratch);
-    if (drape_arena_status(&p->arena))
+    p->shifted =
+        drape_arena_take(&p->tangent.arena, (size_t)p->tangent.pattern->nonzeros, sizeof *p->shifted);
+    p->scratch = drape_arena_take(&p->tangent.arena, (size_t)p->n, sizeof *p->scratch);
+    if (drape_arena_status(&p->tangent.arena))
         return DRAPE_E_MEMORY;
     const drape_pattern *pattern = p->tangent.pattern;
     for (int32_t j = 0; j < pattern->block_count; j++) {
@@ -443,9 +431,6 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
     }
     if (!(p->stiffest > 0))
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT, "nothing in this scene has a stiffness");
-    status = p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
-    if (status)
-        return status;
     status = p->buckling ? prepare_buckling(p) : factor_below_all(p);
     if (!status)
         status = search_all(p, def->count, &below);
@@ -473,14 +458,9 @@ drape_status drape_sim_modes(drape_sim *sim, const drape_modes_def *given, drape
             sim->ctx, DRAPE_E_ARGUMENT,
             "drape_sim_modes: count = %d and load_factor = %g; they are at least 1 and at least 0",
             (int)def.count, def.load_factor);
-    problem p = {.ctx = sim->ctx, .arena = drape_arena_of(sim->ctx), .buckling = def.buckling};
-    p.factor_arena = drape_arena_of(sim->ctx);
+    problem p = {.ctx = sim->ctx, .buckling = def.buckling};
     drape_status status = compute(&p, sim, &def, out);
-    if (p.solver)
-        drape_linear_destroy(p.solver, &p.factors);
-    drape_arena_free(&p.factor_arena);
     lab_tangent_close(&p.tangent);
-    drape_arena_free(&p.arena);
     if (status)
         drape_modes_free(out);
     return status;

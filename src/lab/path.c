@@ -19,7 +19,6 @@
 #include "drape/lab.h"
 #include "lab/tangent.h"
 #include "solvers/inertia.h"
-#include "solvers/linear.h"
 
 #include <float.h>
 #include <math.h>
@@ -44,10 +43,7 @@ typedef struct follower {
     drape_context *ctx;
     drape_sim *sim;
     const drape_path_def *def;
-    drape_arena arena, factor_arena;
-    lab_tangent tangent;
-    const drape_linear_ops *solver;
-    void *factors;
+    lab_tangent tangent; /* its arena has all arrays */
     size_t n, nodes;
     double mass;                  /* [kg] of all free nodes, once per coordinate */
     double *x;                    /* (nodes) a trial */
@@ -103,10 +99,10 @@ static drape_status factor(follower *p)
     lab_tangent_evaluate(t, p->x, p->point.factor + p->change, NULL, p->load, t->values);
     if (!drape_all_finite(t->values, (size_t)t->pattern->nonzeros))
         return DRAPE_RETRY_NONFINITE;
-    drape_status status = p->solver->factor(p->factors, t->values);
+    drape_status status = t->solver->factor(t->factors, t->values);
     for (size_t i = 0; i < p->n; i++)
         p->a[i] = -p->load[i];
-    return status ? status : p->solver->solve(p->factors, p->a, p->b);
+    return status ? status : lab_tangent_solve(t, p->a, p->b);
 }
 
 /* Corrects the step so far until its end is an equilibrium. limit [m]: of a correction. DRAPE_RETRY_* if that
@@ -131,7 +127,7 @@ static drape_status correct(follower *p, control by, double limit, drape_path_po
             return status;
         for (size_t i = 0; i < p->n; i++)
             p->force[i] = -p->force[i];
-        status = p->solver->solve(p->factors, p->force, p->a);
+        status = lab_tangent_solve(&p->tangent, p->force, p->a);
         if (status)
             return status;
         const double *normal = by == CONTROL_BRANCH ? p->mode : p->step;
@@ -158,7 +154,7 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
     if (!lab_tangent_is_symmetric(t, t->values))
         return DRAPE_OK;
     *unstable = 0;
-    drape_status status = lab_tangent_factor_definite(t, p->solver, p->factors, t->values, &known);
+    drape_status status = lab_tangent_factor_definite(t, t->values, &known);
     if (status || known)
         return status;
     status = drape_inertia(p->ctx, t->pattern, t->values, NULL, unstable, &known);
@@ -264,15 +260,11 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
 static drape_status find_mode(follower *p)
 {
     drape_status status = open_step(p);
-    uint64_t state = 1;
-    for (size_t i = 0; i < p->n; i++) { /* a start without symmetry */
-        state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-        p->mode[i] = (double)(state >> 11) / 4503599627370496.0 - 1;
-    }
+    lab_tangent_noise(1, p->mode, p->n);
     for (int k = 0; !status && k < MODE_ITERATIONS; k++) {
         for (size_t i = 0; i < p->n; i++)
             p->a[i] = p->tangent.mass[i] * p->mode[i];
-        status = p->solver->solve(p->factors, p->a, p->mode);
+        status = lab_tangent_solve(&p->tangent, p->a, p->mode);
         const double size = norm(p, p->mode);
         for (size_t i = 0; i < p->n; i++)
             p->mode[i] /= size;
@@ -416,18 +408,17 @@ static drape_status open(follower *p)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
                           "a path of equilibria is followed without contact: leave out colliders and "
                           "self_contact");
-    drape_status status = lab_tangent_open(&p->arena, p->sim, p->def->from, false, &p->tangent);
+    drape_status status = lab_tangent_open(p->sim, p->def->from, false, &p->tangent);
     if (status)
         return status;
     p->n = (size_t)p->tangent.pattern->n;
     p->nodes = 3 * (size_t)m->node_count;
-    p->solver = drape_linear_best(p->tangent.pattern->n);
     double **const arrays[] = {&p->force, &p->load, &p->a, &p->b, &p->step, &p->before, &p->ahead, &p->mode};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        *arrays[i] = drape_arena_take(&p->arena, p->n, sizeof **arrays[i]);
-    p->x = drape_arena_take(&p->arena, p->nodes, sizeof *p->x);
-    p->still = drape_arena_take(&p->arena, p->nodes, sizeof *p->still);
-    if (drape_arena_status(&p->arena))
+        *arrays[i] = drape_arena_take(&p->tangent.arena, p->n, sizeof **arrays[i]);
+    p->x = drape_arena_take(&p->tangent.arena, p->nodes, sizeof *p->x);
+    p->still = drape_arena_take(&p->tangent.arena, p->nodes, sizeof *p->still);
+    if (drape_arena_status(&p->tangent.arena))
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < p->n; i++)
         p->mass += p->tangent.mass[i] / 3;
@@ -443,13 +434,13 @@ static drape_status open(follower *p)
      * found by what they do. */
     lab_tangent_evaluate(&p->tangent, drape_sim_state(p->sim)->x, 0, NULL, p->load, NULL);
     const double most = fmax(fabs(p->def->from), fabs(p->def->to)) * largest(p->load, p->n);
-    if (most > 0 && most < p->rounding)
-        return drape_fail(
-            p->ctx, DRAPE_E_ARGUMENT,
-            "the loads are at most %.3g N on a node, less than rounding leaves of the cloth's own "
-            "forces, %.3g N: a path needs larger loads",
-            most, p->rounding);
-    return p->solver->create(&p->factor_arena, p->tangent.pattern, &p->factors);
+    return most > 0 && most < p->rounding
+               ? drape_fail(
+                     p->ctx, DRAPE_E_ARGUMENT,
+                     "the loads are at most %.3g N on a node, less than rounding leaves of the cloth's "
+                     "own forces, %.3g N: a path needs larger loads",
+                     most, p->rounding)
+               : DRAPE_OK;
 }
 
 void drape_path_def_init(drape_path_def *def, size_t struct_size)
@@ -477,15 +468,9 @@ drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
             "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "
             "max_points >= 1, 0 < tolerance < 1, branch is -1, 0 or 1, and 0 with load_control");
     follower p = {.ctx = sim->ctx, .sim = sim, .def = &def};
-    p.arena = drape_arena_of(sim->ctx);
-    p.factor_arena = drape_arena_of(sim->ctx);
     status = open(&p);
     if (!status)
         status = follow(&p);
-    if (p.solver)
-        drape_linear_destroy(p.solver, &p.factors);
-    drape_arena_free(&p.factor_arena);
     lab_tangent_close(&p.tangent);
-    drape_arena_free(&p.arena);
     return status;
 }

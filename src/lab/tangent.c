@@ -44,8 +44,9 @@ static void take_free(const drape_model *m, const double *nodes, double *free)
         memcpy(free + 3 * (size_t)f, nodes + 3 * (size_t)m->node_of_free[f], 3 * sizeof *free);
 }
 
-static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_potential)
+static drape_status read_state(lab_tangent *t, bool needs_potential)
 {
+    drape_arena *arena = &t->arena;
     const drape_model *m = t->sim->model;
     const drape_state *now = drape_sim_state(t->sim);
     const drape_point point = point_at(t, now->x);
@@ -89,11 +90,11 @@ static drape_status read_state(lab_tangent *t, drape_arena *arena, bool needs_po
                : DRAPE_OK;
 }
 
-drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, bool needs_potential,
-                              lab_tangent *t)
+drape_status lab_tangent_open(drape_sim *sim, double factor, bool needs_potential, lab_tangent *t)
 {
     const drape_model *m = sim->model;
-    *t = (lab_tangent){.ctx = sim->ctx, .sim = sim, .factor = factor, .arena = arena};
+    *t = (lab_tangent){.ctx = sim->ctx, .sim = sim, .factor = factor, .arena = drape_arena_of(sim->ctx)};
+    drape_arena *arena = &t->arena;
     if (m->free_count == 0)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "all nodes are pinned: there are no modes");
     if (m->has_kinetic)
@@ -130,12 +131,20 @@ drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor,
         status = drape_system_continue(t->system, sim->system, same, drape_sim_state(sim)->t);
     if (!status)
         drape_system_copy_wind(t->system, sim->system);
-    return status ? status : read_state(t, arena, needs_potential);
+    if (!status)
+        status = read_state(t, needs_potential);
+    if (status)
+        return status;
+    t->solver = drape_linear_best(t->pattern->n);
+    return t->solver->create(arena, t->pattern, &t->factors);
 }
 
 void lab_tangent_close(lab_tangent *t)
 {
+    if (t->solver)
+        drape_linear_destroy(t->solver, &t->factors);
     drape_system_destroy(&t->system);
+    drape_arena_free(&t->arena);
 }
 
 bool lab_tangent_is_symmetric(const lab_tangent *t, double *values)
@@ -146,9 +155,9 @@ bool lab_tangent_is_symmetric(const lab_tangent *t, double *values)
     return symmetric;
 }
 
-drape_status lab_tangent_factor_definite(const lab_tangent *t, const drape_linear_ops *solver, void *factors,
-                                         const double *values, bool *definite)
+drape_status lab_tangent_factor_definite(const lab_tangent *t, const double *values, bool *definite)
 {
+    const drape_linear_ops *solver = t->solver;
     int64_t negative = 0;
     bool known = true;
     drape_status status = DRAPE_OK;
@@ -156,10 +165,22 @@ drape_status lab_tangent_factor_definite(const lab_tangent *t, const drape_linea
         status = drape_inertia(t->ctx, t->pattern, values, NULL, &negative, &known);
     *definite = known && negative == 0;
     if (!status && *definite)
-        status = solver->factor_definite ? solver->factor_definite(factors, values)
-                                         : solver->factor(factors, values);
+        status = (solver->factor_definite ? solver->factor_definite : solver->factor)(t->factors, values);
     *definite = *definite && !status;
     return status < 0 ? status : DRAPE_OK;
+}
+
+drape_status lab_tangent_solve(const lab_tangent *t, double *b, double *x)
+{
+    return t->solver->solve(t->factors, b, x);
+}
+
+void lab_tangent_noise(uint64_t seed, double *x, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        x[i] = (double)(seed >> 11) / 4503599627370496.0 - 1;
+    }
 }
 
 void lab_tangent_multiply(const lab_tangent *t, const double *values, const double *x, double *y)
@@ -212,7 +233,7 @@ double lab_tangent_evaluate(const lab_tangent *t, const double *x, double factor
     return largest;
 }
 
-drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *values)
+drape_status lab_tangent_slope(lab_tangent *t, const double *u, double *values)
 {
     const size_t count = (size_t)t->pattern->nonzeros;
     /* The largest change of an edge along u, in parts of its length: of its length or of its direction. */
@@ -231,9 +252,9 @@ drape_status lab_tangent_slope(const lab_tangent *t, const double *u, double *va
         }
         change = fmax(change, sqrt(moved / length));
     }
-    double *x = drape_arena_take(t->arena, 3 * (size_t)m->node_count, sizeof *x);
-    double *before = drape_arena_take(t->arena, count, sizeof *before);
-    if (drape_arena_status(t->arena))
+    double *x = drape_arena_take(&t->arena, 3 * (size_t)m->node_count, sizeof *x);
+    double *before = drape_arena_take(&t->arena, count, sizeof *before);
+    if (drape_arena_status(&t->arena))
         return DRAPE_E_MEMORY;
     if (!(change > 0) || !isfinite(change))
         return drape_fail(t->ctx, DRAPE_E_ARGUMENT,

@@ -30,14 +30,15 @@ typedef struct lab_tangent {
     bool linear;       /* no load has a part in K */
     double factor;     /* of the loads */
     bool full;         /* loads have the values that the scene gives, whatever they are at this time */
-    drape_arena *arena;
+    const drape_linear_ops *solver;
+    void *factors;     /* of the solver */
+    drape_arena arena; /* of all arrays, also those of the caller */
 } lab_tangent;
 
-/* Evaluates K. Close it in any case. needs_potential: refuses a K that is not symmetric; else that is what it
- * may be. Errors: DRAPE_E_MEMORY; DRAPE_E_ARGUMENT (no free node, or such a K); DRAPE_E_SOLVER (K is not
- * finite). */
-drape_status lab_tangent_open(drape_arena *arena, drape_sim *sim, double factor, bool needs_potential,
-                              lab_tangent *tangent);
+/* Evaluates K, and creates a solver for matrices of its pattern. The caller closes the tangent in any case.
+ * needs_potential: refuses a K that is not symmetric. Errors: DRAPE_E_MEMORY; DRAPE_E_ARGUMENT (no free node,
+ * or such a K); DRAPE_E_SOLVER (K is not finite). */
+drape_status lab_tangent_open(drape_sim *sim, double factor, bool needs_potential, lab_tangent *tangent);
 void lab_tangent_close(lab_tangent *tangent);
 
 /* At nodes x (nodes x 3), with the internal variables of the sim's present state, and a factor of the loads:
@@ -54,8 +55,14 @@ bool lab_tangent_is_symmetric(const lab_tangent *tangent, double *values);
 /* Factors a symmetric matrix of the pattern if it is positive definite; *definite: it is. A Cholesky
  * factorisation finds that of matrices whose inertia is too inexact to be counted. Errors: DRAPE_E_MEMORY,
  * DRAPE_E_STOPPED, DRAPE_E_SOLVER. */
-drape_status lab_tangent_factor_definite(const lab_tangent *tangent, const drape_linear_ops *solver,
-                                         void *factors, const double *values, bool *definite);
+drape_status lab_tangent_factor_definite(const lab_tangent *tangent, const double *values, bool *definite);
+
+/* x = A^-1 b by the factors of the last matrix. Returns the status of the solver. */
+drape_status lab_tangent_solve(const lab_tangent *tangent, double *b, double *x);
+
+/* Numbers between -1 and 1 without any symmetry that a mode might have: Knuth's linear congruential
+ * sequence. */
+void lab_tangent_noise(uint64_t seed, double *x, size_t count);
 
 /* y = A x for a symmetric matrix in the pattern. */
 void lab_tangent_multiply(const lab_tangent *tangent, const double *values, const double *x, double *y);
@@ -66,6 +73,6 @@ void lab_tangent_shift(const lab_tangent *tangent, double share, const double *o
 /* values (pattern.nonzeros) = dK/dfactor [N/m] along the path of equilibria, whose nodes move by u (n) [m]
  * per unit of the factor: by central differences of K, which is exact in x and in the factor. Errors:
  * DRAPE_E_MEMORY; DRAPE_E_ARGUMENT (cloth comes into contact within the difference, or u is 0). */
-drape_status lab_tangent_slope(const lab_tangent *tangent, const double *u, double *values);
+drape_status lab_tangent_slope(lab_tangent *tangent, const double *u, double *values);
 
 #endif
