@@ -282,7 +282,7 @@ typedef enum verdict { CLEAN, FEW, SOME, MANY, SHORT, STRAINED, STOPPED, EXPLODE
 #define TEXT(x)   #x
 #define NUMBER(x) TEXT(x)
 
-/* Without rejections, and with ever more of them: shades of one blue. Those up to STRAINED got to the end. */
+/* Without rejections, and with ever more of them: shades of one blue. Runs up to STRAINED completed. */
 static const struct {
     const char *name;
     int colour;
@@ -298,8 +298,8 @@ static const struct {
     [LATE] = {"over budget", LAB_DARK},
 };
 
-/* Whether a run completed in so few steps that nothing had the time to grow: it is hatched, whatever else
- * is said of it. */
+/* Whether a run completed in so few steps that nothing had the time to grow: its cell is hatched, whatever
+ * its verdict is. */
 static bool is_short(const json_t *result)
 {
     return lab_is_good(result) && lab_number(result, "accepted") < DRAPE_FEW_STEPS;
@@ -308,8 +308,7 @@ static bool is_short(const json_t *result)
 static verdict judge(const lab *l, const json_t *result)
 {
     const drape_integrator_ops *integrator = lab_find_integrator(lab_tag_text(result, "integrator"));
-    const double accepted = lab_number(result, "accepted");
-    const double share = lab_number(result, "rejected") / fmax(1, accepted);
+    const double share = lab_number(result, "rejected") / fmax(1, lab_number(result, "accepted"));
     if (strcmp(lab_text(result, "status"), "over_budget") == 0)
         return LATE;
     if (!lab_is_good(result)) /* explicit integrators stop because waves grow */
@@ -321,41 +320,59 @@ static verdict judge(const lab *l, const json_t *result)
     return share <= 0 ? CLEAN : share <= 0.01 ? FEW : share <= 0.1 ? SOME : MANY;
 }
 
-/* ---- Colours of results ---- */
+/* The name of a verdict in a legend. */
+static void verdict_text(const lab *l, int v, char text[96])
+{
+    snprintf(text, 96, v == LATE ? "%s (%.3g s)" : "%s", verdicts[v].name,
+             lab_number(l->arguments, "case_seconds"));
+}
 
-/* A result and the scale of its values over all cases, so that the figures of all integrators can be
- * compared. */
-typedef struct shade {
-    const lab_quantity *quantity; /* NULL: none, colours are those of the verdicts */
-    lab_axis axis;
-    bool magnitude; /* values are those without their sign */
-} shade;
+/* ---- Figures ---- */
 
 #define DECADES     8  /* that a logarithmic scale has at most, below its largest value */
 #define LOGARITHMIC 30 /* a scale of values of larger ratios is logarithmic */
 
-/* Whether a run got to its end: its results can be shown. */
-static bool has_results(verdict v)
+/* A figure: a map of the cells of an integrator, at an index on the third axis; or all integrators over a
+ * single axis, a row or a curve each. */
+typedef struct map {
+    lab *l;
+    const space *s;
+    const lab_quantity *quantity; /* whose values are shown; NULL: none, colours are those of the verdicts */
+    lab_axis scale;               /* of its values over all cases, so that figures can be compared */
+    bool magnitude;               /* the scale is that of the values without their sign */
+    size_t first;                 /* the first case of the figure */
+    int rows;
+    int limits; /* drawn so far */
+    lab_figure f;
+} map;
+
+/* What a figure shows of a case. */
+typedef struct cell {
+    verdict verdict;
+    bool completed; /* the run has results */
+    bool is_short;
+    double value; /* of the quantity, as the scale has it; NaN: none */
+} cell;
+
+static cell cell_of(const map *m, size_t i)
 {
-    return v <= STRAINED;
+    const json_t *result = m->l->results[i];
+    cell c = {judge(m->l, result), false, is_short(result), NAN};
+    c.completed = c.verdict <= STRAINED;
+    if (c.completed && m->quantity)
+        c.value = lab_number(result, m->quantity->entry.name);
+    c.value = m->magnitude ? fabs(c.value) : c.value;
+    return c;
 }
 
-/* A result as the scale has it. NaN: the run has none. */
-static double shown_value(const lab *l, const shade *sh, size_t i)
+/* Finds the range of the values: logarithmic, of magnitudes, if these differ much. Values that are zero are
+ * at the low end then, below all others. */
+static void find_scale(map *m)
 {
-    const double value = lab_number(l->results[i], sh->quantity->entry.name);
-    return !has_results(judge(l, l->results[i])) ? NAN : sh->magnitude ? fabs(value) : value;
-}
-
-/* The range of the values: logarithmic, of magnitudes, if these differ much. Values that are zero are at
- * the low end then, below all others. */
-static shade make_shade(const lab *l, const lab_quantity *quantity)
-{
-    shade sh = {.quantity = quantity};
     double low = INFINITY, high = -INFINITY, least = INFINITY, most = 0;
     bool zeros = false;
-    for (size_t i = 0; i < l->count; i++) {
-        const double value = shown_value(l, &sh, i), size = fabs(value);
+    for (size_t i = 0; i < m->l->count; i++) {
+        const double value = cell_of(m, i).value, size = fabs(value);
         if (isnan(value))
             continue;
         low = fmin(low, value);
@@ -364,104 +381,20 @@ static shade make_shade(const lab *l, const lab_quantity *quantity)
         least = size > 0 ? fmin(least, size) : least;
         zeros |= size == 0;
     }
-    sh.axis.log = most > LOGARITHMIC * least;
-    sh.magnitude = sh.axis.log && low < 0;
-    const char *bars = sh.magnitude ? "|" : "", *unit = quantity->unit;
-    snprintf(sh.axis.label, sizeof sh.axis.label, *unit ? "%s%s%s [%s]" : "%s%s%s", bars,
-             quantity->entry.name, bars, unit);
-    if (sh.axis.log) {
+    m->scale.log = most > LOGARITHMIC * least;
+    m->magnitude = m->scale.log && low < 0;
+    const char *bars = m->magnitude ? "|" : "", *unit = m->quantity->unit;
+    snprintf(m->scale.label, sizeof m->scale.label, *unit ? "%s%s%s [%s]" : "%s%s%s", bars,
+             m->quantity->entry.name, bars, unit);
+    if (m->scale.log) {
         const double floor = most * pow(10, -DECADES);
-        sh.axis.to = most;
-        sh.axis.from = least < floor ? floor : zeros ? fmax(floor, least / 3) : least;
+        m->scale.to = most;
+        m->scale.from = least < floor ? floor : zeros ? fmax(floor, least / 3) : least;
     } else if (high >= low) {
         const double margin = high > low ? 0 : fmax(0.5 * fabs(high), 1e-3);
-        sh.axis.from = low - margin;
-        sh.axis.to = high + margin;
+        m->scale.from = low - margin;
+        m->scale.to = high + margin;
     }
-    return sh;
-}
-
-/* ---- Maps ---- */
-
-/* A figure: the cells of an integrator, at an index on the third axis, or all integrators over a single
- * axis, a row or a curve each. */
-typedef struct map {
-    const lab *l;
-    const space *s;
-    shade shade;
-    size_t first; /* its first case */
-    int rows;
-    int limits; /* drawn so far */
-    lab_figure f;
-} map;
-
-/* The first case of a row, and the ends of the row on the y axis. */
-static size_t row_of(const map *m, int row, double *bottom, double *top)
-{
-    if (m->s->count == 1) { /* the first integrator on top */
-        *bottom = m->rows - 1 - row - 0.45;
-        *top = *bottom + 0.9;
-    } else
-        cell_bounds(&m->s->axes[1], row, bottom, top);
-    return m->first + (size_t)m->s->axes[0].count * (size_t)row;
-}
-
-/* How a case looks in a layer of the map, the boxes of one kind: cells that look alike can be one box. */
-typedef struct look {
-    bool there;
-    double fill; /* a colour, or a share of the scale */
-} look;
-
-static look look_at(const map *m, lab_fill kind, size_t i)
-{
-    const verdict v = judge(m->l, m->l->results[i]);
-    const double value = m->shade.quantity ? shown_value(m->l, &m->shade, i) : NAN;
-    const bool shows = m->shade.quantity && has_results(v), shaded = shows && !isnan(value);
-    /* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low
-     * end. */
-    const double at = value == 0 && m->shade.axis.log ? 0 : lab_axis_share(&m->shade.axis, value);
-    const double share =
-        shaded ? (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * at))) + 0.5) / LAB_SHADES : 1;
-    switch (kind) {
-    case LAB_COLOURED:
-        return (look){!shaded, shows ? LAB_GREY : verdicts[v].colour};
-    case LAB_SCALED:
-        return (look){shaded, share};
-    case LAB_HATCHED_BLACK:
-        return (look){is_short(m->l->results[i]) && share > 0.5, LAB_BLACK};
-    case LAB_HATCHED_WHITE:
-    default:
-        return (look){is_short(m->l->results[i]) && share <= 0.5, LAB_WHITE};
-    }
-}
-
-/* A row of cells, in which neighbours that look alike are one box. */
-static void write_row(map *m, lab_fill kind, int row)
-{
-    const axis *x = &m->s->axes[0];
-    double left, right, from = 0, bottom, top;
-    const size_t first = row_of(m, row, &bottom, &top);
-    look before = {0}, here = look_at(m, kind, first), next = {0};
-    for (int i = 0; i < x->count; i++, before = here, here = next) {
-        next = i + 1 < x->count ? look_at(m, kind, first + (size_t)i + 1) : (look){.there = false};
-        cell_bounds(x, i, &left, &right);
-        if (!(before.there && before.fill == here.fill))
-            from = left;
-        if (here.there && !(next.there && next.fill == here.fill))
-            lab_figure_box(&m->f, from, right, bottom, top, here.fill);
-    }
-}
-
-static void write_cells(map *m)
-{
-    for (lab_fill kind = LAB_COLOURED; kind <= LAB_HATCHED_WHITE; kind++) {
-        lab_figure_data(&m->f);
-        for (int row = 0; row < m->rows; row++)
-            write_row(m, kind, row);
-        lab_figure_boxes(&m->f, kind);
-    }
-    if (m->shade.quantity)
-        m->f.scale = m->shade.axis;
 }
 
 static const char *axis_name(const axis *a)
@@ -481,6 +414,8 @@ static void set_axis(const axis *a, lab_axis *out)
     snprintf(out->label, sizeof out->label, *unit ? "%.80s [%s]" : "%.80s", axis_name(a), unit);
 }
 
+/* ---- The stability limit of an explicit integrator, where an axis of the figure is the step ---- */
+
 /* The index of the axis that is the step; -1: none is. */
 static int step_axis(const space *s)
 {
@@ -490,15 +425,16 @@ static int step_axis(const space *s)
     return -1;
 }
 
-/* A black line on a white one is seen on every colour. One of them is in the legend. */
+/* Draws the last block of data: a black line on a white one is seen on every colour. One of the lines is in
+ * the legend. */
 static void draw_limit(map *m)
 {
     if (lab_figure_curve(&m->f, (lab_style){LAB_WHITE, 1, 0}, NULL))
         lab_figure_curve(&m->f, (lab_style){LAB_BLACK, 2, 0}, m->limits++ ? NULL : "explicit limit 2/omega");
 }
 
-/* Over a single axis that is the step, the limit of a case is a line from bottom to top, if it is on it. */
-static void add_limit_at(map *m, size_t i, double bottom, double top)
+/* Over a single axis: a line from bottom to top at the limit of a case, if it is on the axis. */
+static void draw_limit_at(map *m, size_t i, double bottom, double top)
 {
     const double limit = lab_number(m->l->results[i], "explicit_limit_s");
     if (step_axis(m->s) != 0 || !(limit >= m->f.axes[0].from && limit <= m->f.axes[0].to))
@@ -509,86 +445,142 @@ static void add_limit_at(map *m, size_t i, double bottom, double top)
     draw_limit(m);
 }
 
-/* The name of a verdict in a legend. */
-static void verdict_text(const lab *l, int v, char text[96])
+/* Over two axes: a curve along the axis that is not the step. */
+static void draw_limit_along(map *m)
 {
-    snprintf(text, 96, v == LATE ? "%s (%.3g s)" : "%s", verdicts[v].name,
-             lab_number(l->arguments, "case_seconds"));
+    const int step = step_axis(m->s);
+    const axis *other = step == 0 || step == 1 ? &m->s->axes[1 - step] : NULL;
+    lab_figure_data(&m->f);
+    for (int k = 0; other && k < other->count; k++) {
+        const size_t i = m->first + (size_t)k * (step == 0 ? (size_t)m->s->axes[0].count : 1);
+        const double limit = lab_number(m->l->results[i], "explicit_limit_s"), along = axis_value(other, k);
+        if (!isnan(limit))
+            lab_figure_point(&m->f, step == 0 ? limit : along, step == 0 ? along : limit);
+    }
+    draw_limit(m);
 }
 
-/* A swatch for each verdict that is on the figure; with a scale, of those that hide it. */
-static drape_status end_map(lab *l, map *m, const char *caption)
+/* ---- Maps ---- */
+
+/* How a case looks in a layer of the map, the boxes of one kind: cells that look alike can be one box. */
+typedef struct look {
+    bool there;
+    double fill; /* a colour, or a share of the scale */
+} look;
+
+static look look_at(const map *m, lab_fill kind, size_t i)
+{
+    const cell c = cell_of(m, i);
+    const bool shaded = !isnan(c.value);
+    /* The middle of one of LAB_SHADES equal parts of the scale, as a share of it. Zeros are at the low
+     * end. */
+    const double at = c.value == 0 && m->scale.log ? 0 : lab_axis_share(&m->scale, c.value);
+    const double share =
+        shaded ? (fmin(LAB_SHADES - 1, fmax(0, floor(LAB_SHADES * at))) + 0.5) / LAB_SHADES : 1;
+    if (kind == LAB_COLOURED)
+        return (look){!shaded, m->quantity && c.completed ? LAB_GREY : verdicts[c.verdict].colour};
+    if (kind == LAB_SCALED)
+        return (look){shaded, share};
+    const bool black = kind == LAB_HATCHED_BLACK;
+    return (look){c.is_short && black == (share > 0.5), black ? LAB_BLACK : LAB_WHITE};
+}
+
+/* The ends of a row on the y axis. */
+static void row_bounds(const map *m, int row, double *bottom, double *top)
+{
+    if (m->s->count > 1) {
+        cell_bounds(&m->s->axes[1], row, bottom, top);
+        return;
+    }
+    *bottom = m->rows - 1 - row - 0.45; /* the first integrator on top */
+    *top = *bottom + 0.9;
+}
+
+/* Rows of cells, in which neighbours that look alike are one box. */
+static void draw_cells(map *m, lab_fill kind)
+{
+    const axis *x = &m->s->axes[0];
+    lab_figure_data(&m->f);
+    for (int row = 0; row < m->rows; row++) {
+        double left, right, from = 0, bottom, top;
+        const size_t first = m->first + (size_t)x->count * (size_t)row;
+        look before = {0}, here = look_at(m, kind, first), next = {0};
+        row_bounds(m, row, &bottom, &top);
+        for (int i = 0; i < x->count; i++, before = here, here = next) {
+            next = i + 1 < x->count ? look_at(m, kind, first + (size_t)i + 1) : (look){.there = false};
+            cell_bounds(x, i, &left, &right);
+            if (!(before.there && before.fill == here.fill))
+                from = left;
+            if (here.there && !(next.there && next.fill == here.fill))
+                lab_figure_box(&m->f, from, right, bottom, top, here.fill);
+        }
+    }
+    lab_figure_boxes(&m->f, kind);
+}
+
+/* Adds a swatch for each verdict that is on the figure; with a scale, for those that hide it. */
+static void add_legend(map *m)
 {
     const size_t end = m->first + (size_t)m->rows * (size_t)m->s->axes[0].count;
     bool seen[VERDICTS] = {false}, blank = false;
     char text[96];
     for (size_t i = m->first; i < end; i++) {
-        const verdict v = judge(l, l->results[i]);
-        seen[v] = true;
-        seen[SHORT] |= is_short(l->results[i]);
-        blank |= m->shade.quantity && has_results(v) && look_at(m, LAB_COLOURED, i).there;
+        const cell c = cell_of(m, i);
+        seen[c.verdict] |= !m->quantity || !c.completed;
+        seen[SHORT] |= c.is_short;
+        blank |= m->quantity && c.completed && isnan(c.value);
     }
     for (int v = 0; v < VERDICTS; v++)
-        if (seen[v] && (!m->shade.quantity || v == SHORT || !has_results((verdict)v))) {
-            verdict_text(l, v, text);
+        if (seen[v]) {
+            verdict_text(m->l, v, text);
             lab_figure_swatch(&m->f, verdicts[v].colour, v == SHORT, text);
         }
     if (blank)
         lab_figure_swatch(&m->f, LAB_GREY, false, "no value");
-    return lab_figure_end(l, &m->f, caption);
 }
 
-/* The map of an integrator; third: the index on the third axis. */
-static drape_status draw_map(lab *l, map *m, int third)
+/* The map of an integrator, at an index on the third axis; or of all over a single axis, the first on top. */
+static drape_status draw_map(map *m, int third)
 {
     const space *s = m->s;
-    const char *integrator = lab_tag_text(l->results[m->first], "integrator");
-    const lab_quantity *quantity = m->shade.quantity;
+    const lab_quantity *quantity = m->quantity;
+    const char *integrator = lab_tag_text(m->l->results[m->first], "integrator");
     const axis *last = &s->axes[s->count - 1];
-    char name[96], caption[256], number[16];
-    snprintf(number, sizeof number, s->count == MAX_AXES ? "_%d" : "", third);
-    snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
-             quantity ? quantity->entry.name : "");
-    lab_figure_begin(l, &m->f, name);
-    snprintf(m->f.title, sizeof m->f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s", integrator,
-             axis_name(last), axis_value(last, third), lab_unit(last->pointer));
-    snprintf(caption, sizeof caption, "%s%s%s", m->f.title, quantity ? ": " : "",
-             quantity ? quantity->entry.summary : "");
-    set_axis(&s->axes[0], &m->f.axes[0]);
-    set_axis(&s->axes[1], &m->f.axes[1]);
-    write_cells(m);
-    /* The stability limit of the step, where one of the two axes is the step, along the other. */
-    const int step = step_axis(s);
-    const axis *other = step == 0 || step == 1 ? &s->axes[1 - step] : NULL;
-    lab_figure_data(&m->f);
-    for (int k = 0; other && k < other->count; k++) {
-        const size_t i = m->first + (size_t)k * (step == 0 ? (size_t)s->axes[0].count : 1);
-        const double limit = lab_number(l->results[i], "explicit_limit_s"), along = axis_value(other, k);
-        if (!isnan(limit))
-            lab_figure_point(&m->f, step == 0 ? limit : along, step == 0 ? along : limit);
-    }
-    draw_limit(m);
-    return end_map(l, m, caption);
-}
-
-/* All integrators over a single axis, a row each, the first on top. */
-static drape_status draw_rows(lab *l, map *m)
-{
-    const char **names = drape_arena_take(&l->arena, (size_t)m->rows, sizeof *names);
+    const char **names = drape_arena_take(&m->l->arena, (size_t)m->rows, sizeof *names);
+    char name[96] = "map", caption[256] = "what happened to each integrator", number[16];
     if (!names)
         return DRAPE_E_MEMORY;
-    lab_figure_begin(l, &m->f, "map");
-    set_axis(&m->s->axes[0], &m->f.axes[0]);
-    m->f.axes[1] = (lab_axis){.from = -0.5, .to = m->rows - 0.5, .names = names, .name_count = m->rows};
-    m->f.plot_height = 6.0 * m->rows;
-    write_cells(m);
-    for (int row = 0; row < m->rows; row++) {
-        double bottom, top;
-        const size_t first = row_of(m, row, &bottom, &top);
-        names[m->rows - 1 - row] = lab_tag_text(l->results[first], "integrator");
-        add_limit_at(m, first, bottom, top);
+    snprintf(number, sizeof number, s->count == MAX_AXES ? "_%d" : "", third);
+    if (s->count > 1)
+        snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
+                 quantity ? quantity->entry.name : "");
+    lab_figure_begin(m->l, &m->f, name);
+    set_axis(&s->axes[0], &m->f.axes[0]);
+    if (s->count > 1) {
+        set_axis(&s->axes[1], &m->f.axes[1]);
+        snprintf(m->f.title, sizeof m->f.title, s->count == MAX_AXES ? "%s, %.80s = %.4g %s" : "%s",
+                 integrator, axis_name(last), axis_value(last, third), lab_unit(last->pointer));
+        snprintf(caption, sizeof caption, "%s%s%s", m->f.title, quantity ? ": " : "",
+                 quantity ? quantity->entry.summary : "");
+    } else {
+        m->f.axes[1] = (lab_axis){.from = -0.5, .to = m->rows - 0.5, .names = names, .name_count = m->rows};
+        m->f.plot_height = 6.0 * m->rows;
     }
-    return end_map(l, m, "what happened to each integrator");
+    for (lab_fill kind = LAB_COLOURED; kind <= LAB_HATCHED_WHITE; kind++)
+        draw_cells(m, kind);
+    if (quantity)
+        m->f.scale = m->scale;
+    if (s->count > 1)
+        draw_limit_along(m);
+    for (int row = 0; s->count == 1 && row < m->rows; row++) {
+        const size_t first = m->first + s->cells * (size_t)row;
+        double bottom, top;
+        row_bounds(m, row, &bottom, &top);
+        names[m->rows - 1 - row] = lab_tag_text(m->l->results[first], "integrator");
+        draw_limit_at(m, first, bottom, top);
+    }
+    add_legend(m);
+    return lab_figure_end(m->l, &m->f, caption);
 }
 
 /* ---- Curves over a single axis ---- */
@@ -601,14 +593,11 @@ typedef enum mark { ON_CURVE, FEW_STEPS, NO_RESULT, OVER_BUDGET, MARKS } mark;
 
 static mark mark_of(const map *m, size_t i)
 {
-    const json_t *result = m->l->results[i];
-    return judge(m->l, result) == LATE              ? OVER_BUDGET
-           : isnan(shown_value(m->l, &m->shade, i)) ? NO_RESULT
-           : is_short(result)                       ? FEW_STEPS
-                                                    : ON_CURVE;
+    const cell c = cell_of(m, i);
+    return c.verdict == LATE ? OVER_BUDGET : isnan(c.value) ? NO_RESULT : c.is_short ? FEW_STEPS : ON_CURVE;
 }
 
-/* The numbers of the marks of each kind of an integrator. Returns whether any has no result. */
+/* Counts the marks of each kind of an integrator. Returns whether any has no result. */
 static bool count_marks(const map *m, size_t first, int counts[MARKS])
 {
     memset(counts, 0, MARKS * sizeof *counts);
@@ -617,11 +606,11 @@ static bool count_marks(const map *m, size_t first, int counts[MARKS])
     return counts[NO_RESULT] + counts[OVER_BUDGET] > 0;
 }
 
-/* The marks of a kind of one integrator; missing values break the curve. height: of those without results. A
- * logarithmic axis shows no zeros. */
-static void write_marks(map *m, size_t first, mark kind, double height)
+/* Adds the marks of a kind of one integrator; missing values break the curve. height: of those without
+ * results. A logarithmic axis shows no zeros. */
+static void add_marks(map *m, size_t first, mark kind, double height)
 {
-    const double least = m->shade.axis.log ? m->shade.axis.from : -INFINITY;
+    const double least = m->scale.log ? m->scale.from : -INFINITY;
     bool any = false;
     lab_figure_data(&m->f);
     for (int k = 0; k < m->s->axes[0].count; k++) {
@@ -629,7 +618,7 @@ static void write_marks(map *m, size_t first, mark kind, double height)
         const bool here = mark_of(m, i) == kind;
         if (here)
             lab_figure_point(&m->f, axis_value(&m->s->axes[0], k),
-                             kind >= NO_RESULT ? height : fmax(shown_value(m->l, &m->shade, i), least));
+                             kind >= NO_RESULT ? height : fmax(cell_of(m, i).value, least));
         else if (any)
             lab_figure_point(&m->f, NAN, NAN);
         any |= here;
@@ -638,22 +627,23 @@ static void write_marks(map *m, size_t first, mark kind, double height)
 
 /* Values over a single axis, a curve for each integrator. Runs of few steps are open markers off the curve,
  * and those without a result a row of crosses above the curves. */
-static drape_status draw_curves(lab *l, map *m)
+static drape_status draw_curves(map *m)
 {
     static const int markers[MARKS] = {
         [FEW_STEPS] = LAB_OPEN_MARKER, [NO_RESULT] = LAB_CROSS_MARKER, [OVER_BUDGET] = LAB_PLUS_MARKER};
     static const char *const none[] = {""};
+    const lab *l = m->l;
     lab_axis *y = &m->f.axes[1];
     char name[96], text[96];
     int failed = 0, counts[MARKS];
     bool seen[MARKS] = {false}, stopped = false, completed = false; /* runs that have no value */
-    snprintf(name, sizeof name, "curve_%s", m->shade.quantity->entry.name);
-    lab_figure_begin(l, &m->f, name);
+    snprintf(name, sizeof name, "curve_%s", m->quantity->entry.name);
+    lab_figure_begin(m->l, &m->f, name);
     set_axis(&m->s->axes[0], &m->f.axes[0]);
     for (size_t first = 0; first < l->count; first += m->s->cells)
         failed += count_marks(m, first, counts);
     /* The ends of the y axis: the scale with margins, and room above for `failed` lines of markers. */
-    *y = m->shade.axis;
+    *y = m->scale;
     if (!(y->to > y->from)) { /* no run has a value: there are markers only, and no numbers */
         y->to = y->from + 1;
         y->names = none;
@@ -662,7 +652,7 @@ static drape_status draw_curves(lab *l, map *m)
     m->f.plot_height = CURVE_ROOM + FAILED_ROOM * failed;
     lab_axis_widen(y, 0.04, 0.04 + FAILED_ROOM * failed / CURVE_ROOM);
     for (size_t first = 0; first < l->count; first += m->s->cells)
-        add_limit_at(m, first, y->from, y->to);
+        draw_limit_at(m, first, y->from, y->to);
     for (size_t first = 0; first < l->count; first += m->s->cells) {
         const char *integrator = lab_tag_text(l->results[first], "integrator");
         const double height = lab_axis_value(y, 1 - FAILED_ROOM * (failed - 0.5) / m->f.plot_height);
@@ -671,20 +661,16 @@ static drape_status draw_curves(lab *l, map *m)
         if (!counts[ON_CURVE])
             lab_figure_marker(&m->f, filled, integrator);
         for (mark kind = ON_CURVE; kind < MARKS; kind++) {
-            if (!counts[kind])
-                continue;
-            seen[kind] = true;
-            write_marks(m, first, kind, height);
-            if (kind == ON_CURVE)
-                lab_figure_curve(&m->f, filled, integrator);
-            else
-                lab_figure_curve(
-                    &m->f, (lab_style){open.colour, 0, kind == FEW_STEPS ? open.point : markers[kind]}, NULL);
+            const int point = kind == FEW_STEPS ? open.point : markers[kind];
+            add_marks(m, first, kind, height);
+            lab_figure_curve(&m->f, kind == ON_CURVE ? filled : (lab_style){open.colour, 0, point},
+                             kind == ON_CURVE ? integrator : NULL);
+            seen[kind] |= counts[kind] > 0;
         }
     }
     for (size_t i = 0; i < l->count; i++)
         if (mark_of(m, i) == NO_RESULT)
-            *(has_results(judge(l, l->results[i])) ? &completed : &stopped) = true;
+            *(cell_of(m, i).completed ? &completed : &stopped) = true;
     verdict_text(l, LATE, text);
     const char *const names[MARKS] = {[FEW_STEPS] = verdicts[SHORT].name,
                                       [NO_RESULT] = !completed ? "stopped or exploded"
@@ -694,24 +680,26 @@ static drape_status draw_curves(lab *l, map *m)
     for (mark kind = FEW_STEPS; kind < MARKS; kind++)
         if (seen[kind])
             lab_figure_marker(&m->f, (lab_style){LAB_BLACK, 0, markers[kind]}, names[kind]);
-    return lab_figure_end(l, &m->f, m->shade.quantity->entry.summary);
+    return lab_figure_end(m->l, &m->f, m->quantity->entry.summary);
 }
 
 /* ---- The report ---- */
 
-/* A result that the experiment shows; NULL: what happened. */
+/* Draws a result, or what happened (NULL). */
 static drape_status draw(lab *l, const space *s, const lab_quantity *quantity)
 {
+    const bool single = s->count == 1;
     drape_status status = DRAPE_OK;
-    map m = {.l = l, .s = s, .rows = s->count == 1 ? (int)(l->count / s->cells) : s->axes[1].count};
+    map m = {.l = l, .s = s, .quantity = quantity};
+    m.rows = single ? (int)(l->count / s->cells) : s->axes[1].count;
     const size_t cells = (size_t)s->axes[0].count * (size_t)m.rows;
     if (quantity)
-        m.shade = make_shade(l, quantity);
-    if (s->count == 1)
-        return quantity ? draw_curves(l, &m) : draw_rows(l, &m);
+        find_scale(&m);
+    if (single && quantity)
+        return draw_curves(&m);
     for (; !status && m.first + cells <= l->count; m.first += cells) {
         m.limits = 0;
-        status = draw_map(l, &m, (int)(m.first % s->cells / cells));
+        status = draw_map(&m, (int)(m.first % s->cells / cells));
     }
     return status;
 }
@@ -766,8 +754,8 @@ static drape_status report(lab *l)
     for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells) {
         int64_t count[VERDICTS] = {0};
         const char *comma = "";
-        for (size_t cell = 0; cell < s.cells; cell++)
-            count[judge(l, l->results[first + cell])]++;
+        for (size_t k = 0; k < s.cells; k++)
+            count[judge(l, l->results[first + k])]++;
         fprintf(l->summary, "%s:", lab_tag_text(l->results[first], "integrator"));
         for (int v = 0; v < VERDICTS; v++)
             if (count[v]) {
