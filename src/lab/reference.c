@@ -75,7 +75,10 @@ static void judge(const drape_reference *reference, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
     v->expected = drape_reference_expected(reference, v->parameter);
-    v->documented = reference->documented ? reference->documented(v->parameter) : NAN;
+    v->documented = NAN;
+    for (int i = 0; reference->documented && i < reference->case_count; i++)
+        if (reference->parameters[i] == v->parameter)
+            v->documented = reference->documented[i];
     v->error = v->obtained / (reference->documented ? v->documented : v->expected) - 1;
     v->verdict = *v->message                                 ? DRAPE_OUTCOME_STOPPED
                  : !(fabs(v->error) <= reference->tolerance) ? DRAPE_OUTCOME_FAIL

@@ -53,11 +53,11 @@ struct drape_reference {
     double tolerance;         /* relative; of the documented value where there is one */
     const double *parameters; /* (case_count), see DRAPE_CASES */
     int case_count;
-    double (*expected)(double parameter);   /* NULL: known is given */
-    const double *known;                    /* the expected value of each case, or of all; see DRAPE_KNOWN */
-    int known_count;                        /* case_count, or 1 */
-    double (*documented)(double parameter); /* what the model converges to instead; NULL: no model error */
-    const lab_sheet *sheet;                 /* the scenes of all cases; NULL: `scene` writes them (sheet.h) */
+    double (*expected)(double parameter); /* NULL: known is given */
+    const double *known;                  /* the expected value of each case, or of all; see DRAPE_KNOWN */
+    int known_count;                      /* case_count, or 1 */
+    const double *documented; /* (case_count) what the model converges to instead; NULL: no model error */
+    const lab_sheet *sheet;   /* the scenes of all cases; NULL: `scene` writes them (sheet.h) */
     /* Writes the text of the scene of a case, in which ' stands for "; returns its length. */
     int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
     double constants[4]; /* for `scene` or `measure`, where references differ in them */
@@ -82,6 +82,13 @@ extern const drape_registry drape_reference_registry;
 #define DRAPE_KNOWN(...)                                                                                     \
     .known = (const double[]){__VA_ARGS__},                                                                  \
     .known_count = sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
+
+/* What the model converges to in each case. */
+#define DRAPE_DOCUMENTED(...)                                                                                \
+    .documented = (const double[])                                                                           \
+    {                                                                                                        \
+        __VA_ARGS__                                                                                          \
+    }
 
 /* Defines the reference of that name; meson.build puts it into the table. */
 #define DRAPE_REFERENCE(id, ...) const drape_reference drape_reference_##id = {.entry.name = #id, __VA_ARGS__}

@@ -49,6 +49,10 @@ const char *lab_sheet_format(char text[400], const char *format, ...) __attribut
     .areal_density = STRIP_DENSITY
 #define STRIP(h) FREE_STRIP(h), .pins = "{'edge': 'left', 'clamp': true}"
 
+/* The angle [degree] below the horizontal of the chord to the tip of an inextensible rod of G = 8, clamped
+ * horizontally. */
+#define ROD_CHORD 41.487302559378328
+
 /* The gravity that makes G = rho g L^3/B. */
 #define STRIP_GRAVITY(weight) ((weight)*STRIP_RIGIDITY / STRIP_DENSITY)
 
@@ -83,26 +87,5 @@ drape_status lab_unstable_modes(drape_reference_run *run, double *value);
  * scene along an axis. Constants: the axis (1, 2 or 3; 0: all modes count), how many modes are computed, and
  * by what omega is multiplied. */
 drape_status lab_omega(drape_reference_run *run, double *value);
-
-/* ---- rod.c: differential equations and roots by GSL: heavy and loaded inextensible rods in a plane ---- */
-
-/* The tip of a rod of length 1, clamped horizontally, under its weight G = q L^3/B and a force P = F L^2/B at
- * its end, both downwards: how far it hangs down and reaches. */
-void drape_rod_tip(double weight, double force, double *drop, double *reach);
-
-/* The angle [degree] below the horizontal of the chord to the tip, without a force. */
-double drape_rod_chord(double weight);
-
-/* The smallest k > 0 with y(1) = 0 for y'' + k t^power y = 0, y(0) = 1, y'(0) = 0; it lies between low and
- * high. */
-double drape_rod_threshold(double power, double low, double high);
-
-/* The root of f between low and high, where its signs differ. */
-double drape_root(double (*f)(double x, void *context), void *context, double low, double high);
-
-/* y (n) from t = 0 to 1, with a first step and an absolute tolerance. Returns GSL's status; y[0] is NaN if it
- * failed. */
-int drape_ode(int (*rate)(double t, const double y[], double dy[], void *context), void *context, size_t n,
-              double step, double tolerance, double *y);
 
 #endif
