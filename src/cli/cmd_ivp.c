@@ -71,7 +71,7 @@ static int do_scenes(const ivp_request *request, size_t action)
         if (scenes > 1)
             puts(CLI_SHOWN(command->operands[i]));
         drape_status status = lab_ivp_open(&arena, command->operands[i], &s);
-        s.cancel = cli_interrupted_by;
+        s.def.cancel = cli_interrupted_by;
         if (!status)
             status = actions[action].deed(&s, request, more, &good);
         lab_ivp_close(&s);

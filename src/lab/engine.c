@@ -114,21 +114,21 @@ static bool ends_in(const char *name, const char *ending)
     return length > end && strcmp(name + length - end, ending) == 0;
 }
 
+/* Takes a line of a file as a result, if its case has none yet. */
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
     json_error_t fault;
     json_t *line = drape_json_read(text, strlen(text), JSON_REJECT_DUPLICATES, &fault);
-    if (!line && json_error_code(&fault) == json_error_out_of_memory)
-        return drape_fail_memory(l->ctx, strlen(text));
-    drape_status status = lab_check_line(l, path, number, line, &fault);
+    drape_status status = !line && json_error_code(&fault) == json_error_out_of_memory
+                              ? drape_fail_memory(l->ctx, strlen(text))
+                              : lab_check_line(l, path, number, line, &fault);
     json_t **result = status ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
-    if (!result || *result) {
-        json_decref(line);
-        return status;
+    if (result && !*result) {
+        *result = json_incref(line);
+        ++*found;
     }
-    *result = line;
-    ++*found;
-    return DRAPE_OK;
+    json_decref(line);
+    return status;
 }
 
 /* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay.
@@ -183,14 +183,13 @@ typedef struct sweep {
     drape_file file;
     pthread_mutex_t lock;
     atomic_bool given_up;
-    size_t *order;       /* the cases, those of low rank first; in l->arena */
-    size_t count;        /* of these */
-    size_t next;         /* in that order, the first case that no thread has taken yet */
-    double deadline;     /* [s] wall: when the budget is used up; 0: never */
-    int64_t done, total; /* of this shard */
-    int64_t before;      /* done when it began */
-    double start;        /* [s] wall */
-    drape_status status; /* the first failure; its message is set on l->ctx */
+    size_t *order;        /* (count) the cases to run, those of low rank first; in l->arena */
+    size_t count;         /* of these */
+    size_t next;          /* in that order, the first case that no thread has taken yet */
+    size_t fresh, before; /* cases of this shard that are done: in this sweep, before it */
+    double deadline;      /* [s] wall: when the budget is used up; 0: never */
+    double start;         /* [s] wall */
+    drape_status status;  /* the first failure; its message is set on l->ctx */
 } sweep;
 
 /* Under the lock. */
@@ -201,18 +200,12 @@ static void stop(sweep *s, drape_status status)
     atomic_store(&s->given_up, true);
 }
 
-/* Takes the next case that has no result. Returns l->count if there is none, the budget is used up, or a
- * thread failed. */
+/* Takes the next case. Returns l->count if there is none, the budget is used up, or a thread failed. */
 static size_t take_case(sweep *s)
 {
-    lab *l = s->l;
     pthread_mutex_lock(&s->lock);
-    while (s->next < s->count && (!lab_is_ours(l, s->order[s->next]) || l->results[s->order[s->next]]))
-        s->next++;
-    const size_t mine =
-        s->status || s->next >= s->count || (s->deadline > 0 && drape_clock_seconds() > s->deadline)
-            ? l->count
-            : s->order[s->next++];
+    const bool late = s->deadline > 0 && drape_clock_seconds() > s->deadline;
+    const size_t mine = s->status || s->next == s->count || late ? s->l->count : s->order[s->next++];
     pthread_mutex_unlock(&s->lock);
     return mine;
 }
@@ -230,15 +223,15 @@ static void keep(sweep *s, size_t i, json_t *result)
         stop(s, drape_fail_memory(l->ctx, 1));
         return;
     }
-    s->done++;
+    s->fresh++;
     lab_put_line(&s->file, result);
     drape_status status = drape_file_keep(&s->file);
     if (status)
         stop(s, status);
-    const double wall = drape_clock_seconds() - s->start;
-    const int64_t fresh = s->done - s->before;
+    const double each = (drape_clock_seconds() - s->start) / (double)s->fresh;
     if (def->progress)
-        def->progress(def->user, s->done, s->total, wall / (double)fresh * (double)(s->total - s->done));
+        def->progress(def->user, (int64_t)(s->before + s->fresh), (int64_t)(s->before + s->count),
+                      each * (double)(s->count - s->fresh));
 }
 
 lab_request lab_request_of(const lab *l, size_t index)
@@ -315,25 +308,25 @@ static drape_status sweep_cases(lab *l)
     s.order = drape_arena_take(&l->arena, l->count, sizeof *s.order);
     if (!s.order)
         return DRAPE_E_MEMORY;
-    if (l->def->plan)
-        s.count = lab_plan_sample(l, s.order);
-    for (json_int_t rank = 0; !l->def->plan && s.count < l->count; rank++)
+    size_t all = l->def->plan ? lab_plan_sample(l, s.order) : 0;
+    for (json_int_t rank = 0, seen = 0; !l->def->plan && seen < (json_int_t)l->count; rank++)
         for (size_t i = 0; i < l->count; i++)
-            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank)
-                s.order[s.count++] = i;
+            if (json_integer_value(json_object_get(json_array_get(l->cases, i), "rank")) == rank) {
+                seen++;
+                if (lab_is_ours(l, i))
+                    s.order[all++] = i;
+            }
+    for (size_t k = 0; k < all; k++)
+        if (!l->results[s.order[k]])
+            s.order[s.count++] = s.order[k];
+    s.before = all - s.count;
     cases_name(l, name);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);
-    for (size_t k = 0; k < s.count; k++)
-        if (lab_is_ours(l, s.order[k])) {
-            s.total++;
-            s.before += l->results[s.order[k]] != NULL;
-        }
-    s.done = s.before;
     s.status = begin_lines(l, name, l->def->shard, l->def->shards, &s.file);
     if (!s.status)
         s.status = drape_file_publish(&s.file);
-    if (!s.status && s.done < s.total) {
+    if (!s.status && s.count > 0) {
         while (started < l->def->jobs && !pthread_create(&threads[started], NULL, work, &s))
             started++;
         if (started == 0)
@@ -417,7 +410,9 @@ static drape_status check_settings(lab *l)
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
-    drape_status status = l->experiment->prepare ? lab_try(l->ctx, &(lab_request){.def = l->def}) : DRAPE_OK;
+    drape_status status = DRAPE_OK;
+    if (l->experiment->prepare)
+        status = lab_load(l->ctx, &(lab_request){.def = l->def}, NULL);
     if (!status && l->experiment->check)
         status = l->experiment->check(l);
     for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
@@ -425,7 +420,7 @@ static drape_status try_scene(lab *l)
         const char *series = lab_tag_text(one, "series");
         if (strcmp(series, before) != 0) {
             const lab_request request = lab_request_of(l, i);
-            status = lab_try(l->ctx, &request);
+            status = lab_load(l->ctx, &request, NULL);
         }
         before = series;
     }
@@ -508,12 +503,6 @@ static drape_status claim_folder(lab *l)
                : lab_write_json(l, ABOUT, json_incref(l->about), JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
-static bool is_about(const void *user, const char *name)
-{
-    (void)user;
-    return strcmp(name, ABOUT) == 0;
-}
-
 /* Reads earlier results, and makes the reference that cases are compared with. */
 static drape_status prepare(lab *l)
 {
@@ -526,7 +515,7 @@ static drape_status prepare(lab *l)
     if (useless && l->claimed) {
         char message[DRAPE_MESSAGE_SIZE];
         snprintf(message, sizeof message, "%s", drape_context_message(l->ctx));
-        drape_folder_remove(l->out, is_about, NULL);
+        drape_folder_remove(l->out, drape_folder_is_named, ABOUT);
         drape_folder_discard(&l->out);
         drape_context_set_message(l->ctx, "%s", message);
     }

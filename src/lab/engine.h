@@ -42,12 +42,12 @@ typedef struct lab_request {
                                    recorded; NULL: at frames, which may lie within steps, and at the end */
     size_t time_count;
     const lab_probe *probe; /* NULL or no points: nowhere */
-    lab_trace *record;      /* its frames and, last, its end; or its states at `times`. NULL: not
-                                   recorded. Made here, in: */
-    drape_arena *arena;     /* of the record */
-    double seconds;         /* CPU: a run that takes more is stopped */
-    double deadline;        /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
-    int repeats;            /* the least CPU time of so many counts */
+    lab_trace *record;      /* its frames and, last, its end; or its states at `times`; none of a run that
+                                   did not complete. NULL: not recorded. Made in: */
+    drape_arena *arena;
+    double seconds;  /* CPU: a run that takes more is stopped */
+    double deadline; /* [s] of the wall clock: a run that is not done by then is abandoned; 0: none */
+    int repeats;     /* the least CPU time of so many counts */
     const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
@@ -138,8 +138,8 @@ bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
 /* ---- engine_case.c: a case, the scene with its settings, simulated and measured ---- */
 
-/* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile;
- * *scene is to be destroyed in any case. */
+/* The scene with its settings, and its model; model NULL: only whether it compiles. Errors: as of
+ * drape_scene_load and drape_scene_compile; *scene is to be destroyed in any case. */
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
@@ -157,9 +157,6 @@ drape_status lab_identify(drape_context *ctx, const lab_request *request, char d
 /* Whether the scene still has the identity of the request. Errors: those of loading, DRAPE_E_ARGUMENT (it has
  * another one). */
 drape_status lab_check_identity(drape_context *ctx, const lab_request *request);
-
-/* Whether it compiles. */
-drape_status lab_try(drape_context *ctx, const lab_request *request);
 
 /* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
  * NULL: the deadline passed before it was done. Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED

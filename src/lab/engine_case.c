@@ -56,11 +56,15 @@ drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drap
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model)
 {
     drape_scene *scene = NULL;
-    *model = NULL;
+    drape_model *compiled = NULL;
     drape_status status = lab_load_scene(ctx, request, &scene);
     if (!status)
-        status = drape_scene_compile(scene, model);
+        status = drape_scene_compile(scene, &compiled);
     drape_scene_destroy(&scene);
+    if (model)
+        *model = compiled;
+    else
+        drape_model_destroy(&compiled);
     return status;
 }
 
@@ -140,14 +144,6 @@ drape_status lab_check_identity(drape_context *ctx, const lab_request *request)
                             "\"%.400s\", or a file that it names, was changed while the experiment runs; the "
                             "results so far are of what it was before",
                             path_of(request));
-    return status;
-}
-
-drape_status lab_try(drape_context *ctx, const lab_request *request)
-{
-    drape_model *model = NULL;
-    drape_status status = lab_load(ctx, request, &model);
-    drape_model_destroy(&model);
     return status;
 }
 
@@ -303,6 +299,8 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
     bool repeat = true;
     *result = NULL;
     drape_status status = lab_load(ctx, request, &model);
+    if (request->record)
+        *request->record = (lab_trace){0};
     if (!status && request->record) {
         const double frames = ceil(drape_model_duration(model) * drape_model_frame_rate(model)) + 3;
         status = lab_trace_create(request->arena, 3 * (size_t)drape_model_node_count(model),
@@ -323,6 +321,10 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
         drape_sim_destroy(&sim);
     }
     drape_model_destroy(&model);
+    if (request->record && !lab_is_good(*result)) {
+        drape_arena_release(request->arena, request->record->x);
+        *request->record = (lab_trace){0};
+    }
     return status;
 }
 

@@ -269,7 +269,7 @@ static drape_status plan(lab *l)
         const size_t cells[] = {0, inside, s.cells - 1};
         for (size_t k = 0; k < sizeof cells / sizeof *cells && !status; k++) {
             const lab_request request = lab_request_of(l, first + cells[k]);
-            status = lab_try(l->ctx, &request);
+            status = lab_load(l->ctx, &request, NULL);
         }
     }
     return status;

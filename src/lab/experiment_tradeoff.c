@@ -109,7 +109,7 @@ static drape_status check_reference(lab *l)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < SEQUENCES; i++) {
         json_t *settings = settings_of(&sequences[i], sequences[i].first);
-        status = lab_try(l->ctx, &(lab_request){.def = l->def, .settings = settings});
+        status = lab_load(l->ctx, &(lab_request){.def = l->def, .settings = settings}, NULL);
         json_decref(settings);
     }
     return status;
@@ -195,7 +195,7 @@ static bool is_sequence(const void *user, const char *name)
 static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last)
 {
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
-    lab_trace trace = {0};
+    lab_trace trace;
     json_t *settings = settings_of(s, knob), *result = NULL;
     const lab_request request = {.def = l->def,
                                  .settings = settings,
@@ -205,8 +205,7 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
                                  .deadline = deadline,
                                  .repeats = 1};
     drape_status status = lab_run(l->ctx, &request, &result);
-    const bool good = !status && lab_is_good(result);
-    if (!good) { /* a run that the deadline stopped has no result */
+    if (!trace.frames) { /* a run that the deadline stopped has no result */
         const bool over = strcmp(lab_text(result, "status"), "over_budget") == 0;
         last->ended_by = !result ? BUDGET_SECONDS : over ? CASE_SECONDS : FAILURE;
         snprintf(last->failure, sizeof last->failure, "%s", lab_text(result, "message"));
@@ -215,10 +214,8 @@ static drape_status refine(lab *l, const drape_model *model, const sequence *s, 
     json_decref(result);
     last->took = drape_clock_thread_seconds() - start;
     last->spent += last->took;
-    if (!good) {
-        drape_arena_release(&l->arena, trace.x);
+    if (!trace.frames)
         return status;
-    }
     last->error =
         last->count ? lab_distance(model, lab_trace_end(&trace), lab_trace_end(&last->trace)) : INFINITY;
     drape_arena_release(&l->arena, last->trace.x);

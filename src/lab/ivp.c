@@ -28,6 +28,8 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
 {
     char *name;
     *s = (lab_ivp){.arena = arena, .path = drape_arena_text(arena, path)};
+    drape_lab_def_init(&s->def, sizeof s->def);
+    s->def.scene = s->path;
     const char *slash = strrchr(path, '/');
     s->stem = name = drape_arena_text(arena, slash ? slash + 1 : path);
     if (!s->path || !name)
@@ -109,15 +111,6 @@ double lab_ivp_tolerance(const lab_ivp *s, int order, double dt)
 
 /* ---- Runs ---- */
 
-/* Compiles the scene with settings {pointer: value}. */
-static drape_status load_with(const lab_ivp *s, const json_t *settings, drape_model **model)
-{
-    drape_lab_def def;
-    drape_lab_def_init(&def, sizeof def);
-    def.scene = s->path;
-    return lab_load(s->arena->ctx, &(lab_request){.def = &def, .settings = settings}, model);
-}
-
 /* A step of which so many or, of an explicit method, as many times 2^k as keep it below a quarter of its
  * stability limit at the start, make up an interval. */
 static drape_status find_dt(const lab_ivp *s, const drape_integrator_ops *integrator, int steps, double *dt)
@@ -130,7 +123,8 @@ static drape_status find_dt(const lab_ivp *s, const drape_integrator_ops *integr
         return DRAPE_OK;
     json_t *settings =
         json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, "/integrator/dt", *dt);
-    drape_status status = load_with(s, settings, &model);
+    drape_status status =
+        lab_load(s->arena->ctx, &(lab_request){.def = &s->def, .settings = settings}, &model);
     if (!status)
         status = drape_sim_create(s->arena->ctx, model, NULL, &sim);
     if (!status)
@@ -140,35 +134,6 @@ static drape_status find_dt(const lab_ivp *s, const drape_integrator_ops *integr
     drape_sim_destroy(&sim);
     drape_model_destroy(&model);
     json_decref(settings);
-    return status;
-}
-
-/* Runs the scene with settings {pointer: value}, which this takes, and records it at the times. A run that
- * takes more CPU seconds than that, or fails, leaves no frames: *result says why and is to be freed. */
-static drape_status run_scene(const lab_ivp *s, json_t *settings, double seconds, lab_trace *out,
-                              json_t **result)
-{
-    drape_lab_def def;
-    drape_lab_def_init(&def, sizeof def);
-    def.scene = s->path;
-    def.cancel = s->cancel;
-    const lab_request request = {.def = &def,
-                                 .settings = settings,
-                                 .times = s->times,
-                                 .time_count = s->time_count,
-                                 .record = out,
-                                 .arena = s->arena,
-                                 .seconds = seconds,
-                                 .repeats = 1};
-    *out = (lab_trace){0};
-    *result = NULL;
-    drape_status status = settings ? lab_run(s->arena->ctx, &request, result)
-                                   : drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for settings");
-    json_decref(settings);
-    if (status || !lab_is_good(*result)) {
-        drape_arena_release(s->arena, out->x);
-        *out = (lab_trace){0};
-    }
     return status;
 }
 
@@ -454,7 +419,7 @@ static drape_status refine(const lab_ivp *s, double seconds, const attempt *atte
     a->change = INFINITY;
     for (; !status && !*a->ended_by && a->count < MAX_LEVELS; knob *= f->ratio) {
         json_t *result = NULL;
-        lab_trace trace;
+        lab_trace trace = {0};
         if (a->change < ENOUGH * goal_of(s) ||
             (a->count > 1 && disagreement(s, attempts, before, a) < ENOUGH * goal_of(s)))
             break;
@@ -473,7 +438,17 @@ static drape_status refine(const lab_ivp *s, double seconds, const attempt *atte
             json_object_set_new(settings, pointer, json_integer(f->also_value));
         if (lab_has_param(entry, "tolerance"))
             json_object_set_new(settings, "/integrator/tolerance", json_real(least_tolerance(s)));
-        status = run_scene(s, settings, seconds - a->spent, &trace, &result);
+        const lab_request request = {.def = &s->def,
+                                     .settings = settings,
+                                     .times = s->times,
+                                     .time_count = s->time_count,
+                                     .record = &trace,
+                                     .arena = s->arena,
+                                     .seconds = seconds - a->spent,
+                                     .repeats = 1};
+        status = settings ? lab_run(s->arena->ctx, &request, &result)
+                          : drape_fail(s->arena->ctx, DRAPE_E_MEMORY, "no memory for settings");
+        json_decref(settings);
         took = drape_clock_thread_seconds() - start - a->spent;
         a->spent += took;
         if (!status && trace.frames) {
@@ -637,7 +612,7 @@ static drape_status measure(const lab_ivp *s, const drape_model *model, const do
     bool running = !status;
     for (*reached = 0; running && *reached < SAMPLES; *reached += running) {
         for (int d = 0; running && d <= DIRECTIONS; d++) {
-            if (s->cancel && s->cancel(NULL))
+            if (s->def.cancel && s->def.cancel(NULL))
                 status = drape_fail(s->arena->ctx, DRAPE_E_STOPPED, "interrupted");
             running = !status && !drape_sim_advance(sims[d], t[*reached]);
             if (running && d)
@@ -673,7 +648,7 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     for (int i = 0; i < SAMPLES; i++)
         t[i] = BEYOND * duration * (i + 1) / SAMPLES;
     if (!status)
-        status = load_with(s, settings, &model);
+        status = lab_load(s->arena->ctx, &(lab_request){.def = &s->def, .settings = settings}, &model);
     if (!status)
         status = measure(s, model, t, growth, &count);
     for (size_t i = 0; i < count && t[i] <= duration * (1 + 1e-9); i++)

@@ -22,16 +22,16 @@
 /* A scene of the set, or one that may become one. Its memory is in the arena that it was opened with. */
 typedef struct lab_ivp {
     drape_arena *arena;
-    const char *path, *stem;  /* "DIR/NAME.json", "NAME" */
-    const char *name;         /* the same, printable */
-    drape_lab_cancel *cancel; /* whether to stop, set by the caller; NULL: never */
-    char hash[17];            /* of the scene and the files that it names */
-    drape_model *model;       /* to be closed */
-    double size;              /* [m] */
-    double node_mass;         /* [kg] mean */
-    bool contact;             /* with colliders or of cloth with itself */
-    double interval;          /* [s] between the times */
-    double *times;            /* (time_count) [s] */
+    const char *path, *stem; /* "DIR/NAME.json", "NAME" */
+    const char *name;        /* the same, printable */
+    drape_lab_def def;       /* of runs of the scene; the caller may set def.cancel */
+    char hash[17];           /* of the scene and the files that it names */
+    drape_model *model;      /* to be closed */
+    double size;             /* [m] */
+    double node_mass;        /* [kg] mean */
+    bool contact;            /* with colliders or of cloth with itself */
+    double interval;         /* [s] between the times */
+    double *times;           /* (time_count) [s] */
     size_t time_count;
     lab_trace reference; /* a frame for each time; none: not read */
     double error;        /* of the reference, relative to the size */

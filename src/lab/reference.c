@@ -183,12 +183,6 @@ static void put_line(drape_file *file, const lab_record *record)
     json_decref(line);
 }
 
-static bool is_cases(const void *user, const char *name)
-{
-    (void)user;
-    return strcmp(name, NAME) == 0;
-}
-
 drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *records, size_t count,
                               drape_folder **folder, drape_file *file)
 {
@@ -197,7 +191,7 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
     size_t size;
     drape_status status = drape_folder_open(ctx, path, false, folder);
     if (!status)
-        status = drape_folder_check(*folder, is_cases, NULL, NULL);
+        status = drape_folder_check(*folder, drape_folder_is_named, NULL, NAME);
     if (!status)
         lab_read_text(&arena, path, NAME, &text, &size); /* NULL if there is no such file */
     /* A line that is not JSON, as a kill may leave the last, is ignored. */

@@ -35,10 +35,29 @@ drape_status lab_add_point(lab *l, const lab_point *p)
     return status;
 }
 
+/* Adds a series: an integrator over the levels of a value, with further settings of all its cases, whose
+ * reference this takes. dt and rtol: those of lab_grid.add; NULL: the level. */
+static drape_status add_series(lab *l, const lab_grid *g, const drape_integrator_ops *integrator,
+                               const char *series, const char *pointer, json_t *settings)
+{
+    const bool steps = strcmp(pointer, "/integrator/dt") == 0, own = integrator->own_steps;
+    const lab_levels levels = steps ? g->steps : own ? g->rtols : g->controlled;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < levels.count; i++) {
+        const lab_level level = levels.at[i];
+        json_t *more = json_copy(settings);
+        if (!own && g->add)
+            g->add(g->user, integrator, steps ? level.value : NAN, level.value, more);
+        status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name, pointer,
+                                               steps || own ? g->knob : NULL, level, more});
+    }
+    json_decref(settings);
+    return status;
+}
+
 drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
 {
     const bool own = integrator->own_steps;
-    const lab_levels levels = own ? g->rtols : g->steps;
     drape_status status = DRAPE_OK;
     /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it;
      * otherwise 0, for none, alone. Each series has one: a line through points of different limits has no
@@ -47,36 +66,25 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
     for (size_t i = 0; i < l->def->setting_count; i++)
         chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
     const int limits[2] = {chosen ? 0 : 2, 5};
-    for (size_t k = 0; k < (chosen ? 1 : 2); k++) {
+    for (size_t k = 0; !status && k < (chosen ? 1 : 2); k++) {
         char series[96];
+        json_t *settings = json_object();
         snprintf(series, sizeof series, limits[k] ? "%s, order %d" : "%s", integrator->entry.name, limits[k]);
-        for (size_t i = 0; !status && i < levels.count; i++) {
-            json_t *more = json_object();
-            if (limits[k])
-                json_object_set_new(more, "/integrator/max_order", json_integer(limits[k]));
-            if (!own && g->add)
-                g->add(g->user, integrator, levels.at[i].value, 0, more);
-            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
-                                                   own ? "/integrator/rtol" : "/integrator/dt", g->knob,
-                                                   levels.at[i], more});
-        }
+        if (limits[k])
+            json_object_set_new(settings, "/integrator/max_order", json_integer(limits[k]));
+        status = add_series(l, g, integrator, series, own ? "/integrator/rtol" : "/integrator/dt", settings);
     }
     if (status || own || (g->only_if_implicit && integrator->stability))
         return status;
-    for (int c = 0; drape_controllers[c]; c++) {
+    for (int c = 0; !status && drape_controllers[c]; c++) {
         const drape_entry *controller = &drape_controllers[c]->entry;
         char series[96];
         if (!lab_has_param(controller, "rtol"))
             continue;
         snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
-        for (size_t i = 0; !status && i < g->controlled.count; i++) {
-            json_t *more = json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt",
-                                     g->first_step);
-            if (g->add)
-                g->add(g->user, integrator, NAN, g->controlled.at[i].value, more);
-            status = lab_add_point(l, &(lab_point){g->scene, series, integrator->entry.name,
-                                                   "/controller/rtol", NULL, g->controlled.at[i], more});
-        }
+        status = add_series(
+            l, g, integrator, series, "/controller/rtol",
+            json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt", g->first_step));
     }
     return status;
 }
