@@ -168,7 +168,7 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
 /* The cases of this shard that are run for a plan of def->plan cases, spread evenly over all of them, in the
  * order in which they are to be run: at most def->plan, and the same ones in every call. cases: room for
  * l->count. Returns their number. */
-size_t lab_plan_sample(const lab *l, size_t *cases);
+size_t lab_plan_sample(lab *l, size_t *cases);
 
 /* Writes plan.json, and its sentences into the summary. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_plan(lab *l);

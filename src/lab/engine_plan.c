@@ -36,27 +36,24 @@ bool lab_is_ours(const lab *l, size_t i)
 
 /* ---- The sample ---- */
 
-size_t lab_plan_sample(const lab *l, size_t *cases)
+size_t lab_plan_sample(lab *l, size_t *cases)
 {
     size_t ours = 0, count = 0;
     for (size_t i = 0; i < l->count; i++)
         if (lab_is_ours(l, i))
             cases[ours++] = i;
-    bool *taken = calloc(ours ? ours : 1, sizeof *taken);
-    size_t *order = calloc(ours ? ours : 1, sizeof *order);
-    const size_t wanted = taken && order && (size_t)l->def->plan < ours ? (size_t)l->def->plan : ours;
-    for (size_t k = 0; wanted < ours && count < wanted; k++) {
-        size_t at = (size_t)((double)ours * fmod(0.5 + (double)k * GOLDEN, 1));
-        if (taken[at])
+    size_t *order = drape_arena_take(&l->arena, l->count, sizeof *order);
+    if (!order || (size_t)l->def->plan >= ours)
+        return ours;
+    for (size_t k = 0; count < (size_t)l->def->plan; k++) {
+        size_t *at = &cases[(size_t)((double)ours * fmod(0.5 + (double)k * GOLDEN, 1))];
+        if (*at == l->count) /* it is in the sample already */
             continue;
-        taken[at] = true;
-        order[count++] = cases[at];
+        order[count++] = *at;
+        *at = l->count;
     }
-    if (wanted < ours)
-        memcpy(cases, order, count * sizeof *cases);
-    free(taken);
-    free(order);
-    return wanted;
+    memcpy(cases, order, count * sizeof *cases);
+    return count;
 }
 
 /* ---- Totals ---- */
@@ -79,14 +76,6 @@ static stratum *stratum_of(stratum *strata, size_t *count, const json_t *one)
     return &strata[(*count)++];
 }
 
-static void add_stratum(stratum *a, const stratum *b)
-{
-    a->cases += b->cases;
-    a->count += b->count;
-    a->sum += b->sum;
-    a->squares += b->squares;
-}
-
 typedef struct total {
     double value, low, high; /* bounds of the 95 % confidence interval; NaN: the sample is too small */
 } total;
@@ -94,13 +83,18 @@ typedef struct total {
 /* strata (count + 1): the last one becomes that of those with a small sample. */
 static total total_cpu(stratum *strata, size_t count)
 {
-    stratum *rest = &strata[count], all = {.cases = 0};
-    double sum = 0, variance = 0, freedom = 0;
-    *rest = all;
-    for (size_t i = 0; i < count; i++) {
-        add_stratum(&all, &strata[i]);
-        if (strata[i].count < 2)
-            add_stratum(rest, &strata[i]);
+    stratum *rest = &strata[count];
+    double sum = 0, variance = 0, freedom = 0, spent = 0, sampled = 0;
+    *rest = (stratum){.cases = 0};
+    for (stratum *s = strata; s < rest; s++) {
+        spent += s->sum;
+        sampled += s->count;
+        if (s->count >= 2)
+            continue;
+        rest->cases += s->cases;
+        rest->count += s->count;
+        rest->sum += s->sum;
+        rest->squares += s->squares;
     }
     for (const stratum *s = strata; s <= rest; s++) { /* the total of each and its variance */
         if (s->count < 1 || (s < rest && s->count < 2))
@@ -112,9 +106,9 @@ static total total_cpu(stratum *strata, size_t count)
         freedom += s->count - 1;
     }
     if (rest->count < 1 && rest->cases > 0) /* none of these is in the sample: as the mean of all others */
-        sum += rest->cases * all.sum / fmax(1, all.count);
+        sum += rest->cases * spent / fmax(1, sampled);
     const double half = freedom >= 1 ? lab_student(freedom) * sqrt(variance) : NAN;
-    return (total){sum, fmax(all.sum, sum - half), sum + half};
+    return (total){sum, fmax(spent, sum - half), sum + half};
 }
 
 static double file_bytes(const lab *l, const char *name)

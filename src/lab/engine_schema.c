@@ -68,37 +68,34 @@ static drape_status check_items(const place *at, const json_t *object, const cha
     return DRAPE_OK;
 }
 
-/* The cases of each series side by side; and the cases whose result is that of another. */
-static drape_status check_order(const place *at, const json_t *cases, size_t i, json_t *series)
-{
-    char name[2 * LONGEST];
-    const json_t *one = json_array_get(cases, i), *same = json_object_get(one, "same_as");
-    const json_int_t k = same ? json_integer_value(same) : 0, last = (json_int_t)i - 1;
-    if (same && (k < 0 || k > last || json_object_get(json_array_get(cases, (size_t)k), "same_as")))
-        return refuse(at, "same_as", "must be the number of an earlier case that has a result of its own");
-    snprintf(name, sizeof name, "%s\n%s", lab_tag_text(one, "scene"), lab_tag_text(one, "series"));
-    const json_t *before = json_object_get(series, name);
-    if (json_object_size(series) > MAX_SERIES)
-        return refuse(at, "tags", "there are more than 4096 series");
-    if (before && json_integer_value(before) != last)
-        return refuse(at, "tags", "the cases of a series must stand side by side");
-    return json_object_set_new(series, name, json_integer((json_int_t)i))
-               ? drape_fail(at->ctx, DRAPE_E_MEMORY, "no memory for the cases")
-               : DRAPE_OK;
-}
-
+/* The members of each case; that the cases of a series stand side by side; and that a case has the result of an
+ * earlier one that has a result of its own. */
 static drape_status check_cases(place *at, const json_t *cases)
 {
     json_t *series = json_object(), *one;
     drape_status status = json_array_size(cases) ? DRAPE_OK : refuse(at, "cases", "there is none");
     for (size_t i = 0; !status && (one = json_array_get(cases, i)); i++) {
+        char name[2 * LONGEST];
         snprintf(at->pointer, sizeof at->pointer, "/cases/%zu", i);
         status = check_form(at, one, "{s:{s:s, s?:s, s?:s, s?:s}, s?:{}, s?:I, s?:I}", "tags", "integrator",
                             "scene", "series", "knob", "settings", "same_as", "rank");
         if (!status)
             status = check_members(at, json_object_get(one, "tags"), (const char *const[]){NULL});
-        if (!status)
-            status = check_order(at, cases, i, series);
+        if (status)
+            break;
+        const json_t *same = json_object_get(one, "same_as");
+        const json_int_t k = same ? json_integer_value(same) : 0, last = (json_int_t)i - 1;
+        snprintf(name, sizeof name, "%s\n%s", lab_tag_text(one, "scene"), lab_tag_text(one, "series"));
+        const json_t *before = json_object_get(series, name);
+        if (same && (k < 0 || k > last || json_object_get(json_array_get(cases, (size_t)k), "same_as")))
+            status =
+                refuse(at, "same_as", "must be the number of an earlier case that has a result of its own");
+        else if (json_object_size(series) > MAX_SERIES)
+            status = refuse(at, "tags", "there are more than 4096 series");
+        else if (before && json_integer_value(before) != last)
+            status = refuse(at, "tags", "the cases of a series must stand side by side");
+        else if (json_object_set_new(series, name, json_integer((json_int_t)i)))
+            status = drape_fail(at->ctx, DRAPE_E_MEMORY, "no memory for the cases");
     }
     json_decref(series);
     return status;

@@ -137,12 +137,9 @@ static double error_of(const json_t *result)
     return lab_is_good(result) ? lab_number(result, "error_max") : NAN;
 }
 
-/* The error if it can be distinguished from that of the reference; otherwise NaN. */
 static double resolved_error(const json_t *result)
 {
-    const double error = error_of(result);
-    const double least = RESOLVED * lab_number(result, "reference_error_m") / lab_number(result, "size_m");
-    return error > least ? error : NAN;
+    return lab_resolved_error(result, "error_max", RESOLVED);
 }
 
 /* The least cost at which a series reaches an error: between neighbours of which one is worse and one is

@@ -323,16 +323,14 @@ typedef struct all {
     size_t count;
 } all;
 
-static bool is_resolved(const json_t *result)
-{
-    return lab_is_good(result) &&
-           lab_number(result, "error_end_m") > RESOLVED * lab_number(result, "reference_error_m");
-}
-
-/* The error of a case if it can be distinguished from that of the reference; otherwise NaN. */
 static double resolved_error(const json_t *result)
 {
-    return is_resolved(result) ? lab_number(result, "error_end_m") : NAN;
+    return lab_resolved_error(result, "error_end_m", RESOLVED);
+}
+
+static bool is_resolved(const json_t *result)
+{
+    return !isnan(resolved_error(result));
 }
 
 /* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
