@@ -68,8 +68,8 @@ static drape_status check_items(const place *at, const json_t *object, const cha
     return DRAPE_OK;
 }
 
-/* The members of each case; that the cases of a series stand side by side; and that a case has the result of an
- * earlier one that has a result of its own. */
+/* Checks the members of each case; that the cases of a series stand side by side; and that a case that has
+ * the result of another one has that of an earlier case with a result of its own. */
 static drape_status check_cases(place *at, const json_t *cases)
 {
     json_t *series = json_object(), *one;

@@ -1,10 +1,8 @@
 /* test_modes.c: drape_sim_modes: eigenvalues that are known to rounding, motions without stiffness, states
- * that are unstable, repeated eigenvalues, what modes of a matrix have in common, refusals. Loads at
- * which strips buckle are references of `drape validate`. */
+ * that are unstable, repeated eigenvalues, what modes of a matrix have in common, refusals; memory
+ * that fails, in drape_sim_path too. Loads at which strips buckle are references of `drape validate`. */
 #include "drape/lab.h"
 #include "lab/eigen.h"
-#include "lab/reference.h"
-#include "lab/tangent.h"
 #include "support/failing_allocator.h"
 #include "support/scene.h"
 
@@ -257,41 +255,72 @@ START_TEST(too_many_equal_modes_are_a_failure)
 }
 END_TEST
 
+static drape_status vibrations(drape_sim *sim)
+{
+    drape_modes_def def;
+    drape_modes modes;
+    drape_modes_def_init(&def, sizeof def);
+    def.count = 2;
+    const drape_status status = drape_sim_modes(sim, &def, &modes);
+    drape_modes_free(&modes);
+    return status;
+}
+
+static drape_status buckling_loads(drape_sim *sim)
+{
+    drape_modes_def def;
+    drape_modes modes;
+    drape_modes_def_init(&def, sizeof def);
+    def.count = 2;
+    def.buckling = true;
+    def.load_factor = 0;
+    const drape_status status = drape_sim_modes(sim, &def, &modes);
+    drape_modes_free(&modes);
+    return status;
+}
+
+static drape_status path(drape_sim *sim)
+{
+    drape_path_def def;
+    drape_path_def_init(&def, sizeof def);
+    def.max_points = 3;
+    return drape_sim_path(sim, &def);
+}
+
 /* Every allocation fails once: each failure is reported, and nothing leaks. */
 START_TEST(memory_that_fails_is_reported)
 {
-    static const char text[] =
-        "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 4, \"rows\": 4, "
-        "\"width\": "
-        "1, \"height\": 1}, \"material\": {\"young_modulus\": 1e4, \"thickness\": 1e-2, \"areal_density\": "
-        "0.1}, \"terms\": [\"stretch.cst\", \"bend.midedge\"], \"pins\": [{\"edge\": \"top\", \"clamp\": "
-        "true}]"
-        "}], \"gravity\": [0, 1e-6, 0], \"duration\": 1}";
-    for (int buckling = 0; buckling < 2; buckling++)
+    static const struct {
+        drape_status (*run)(drape_sim *sim);
+        double gravity; /* [m/s2] along y: upwards, the sheet buckles */
+    } runs[] = {{vibrations, 1e-6}, {buckling_loads, 1e-6}, {path, -1e-3}};
+    for (size_t r = 0; r < sizeof runs / sizeof *runs; r++)
         for (long at = 1, done = 0; !done; at++) {
             failing_allocator memory = {0};
             drape_context *ctx = failing_context(&memory);
             drape_scene *parsed = NULL;
             drape_model *model = NULL;
             drape_sim *sim = NULL;
-            drape_modes_def def;
-            drape_modes modes;
-            drape_modes_def_init(&def, sizeof def);
-            def.count = 2;
-            def.buckling = buckling;
-            def.load_factor = 0;
+            char text[500];
+            snprintf(
+                text, sizeof text,
+                "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 4, \"rows\": 4, "
+                "\"width\": 1, \"height\": 1}, \"material\": {\"young_modulus\": 1e4, \"thickness\": "
+                "1e-2, \"areal_density\": 0.1}, \"terms\": [\"stretch.cst\", \"bend.midedge\"], "
+                "\"pins\": [{\"edge\": \"top\", \"clamp\": true}]}], \"gravity\": [0, %g, 0], "
+                "\"duration\": 1}",
+                runs[r].gravity);
             ck_assert_int_eq(drape_scene_parse(ctx, text, "test", &parsed), DRAPE_OK);
             ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
             ck_assert_int_eq(drape_sim_create(ctx, model, NULL, &sim), DRAPE_OK);
             const long live = memory.live;
             memory.calls = 0;
             memory.fail_at = at;
-            const drape_status status = drape_sim_modes(sim, &def, &modes);
+            const drape_status status = runs[r].run(sim);
             done = memory.calls < at;
             memory.fail_at = 0;
             ck_assert_msg(status == (done ? DRAPE_OK : DRAPE_E_MEMORY), "allocation %ld: %s", at,
                           drape_context_message(ctx));
-            drape_modes_free(&modes);
             ck_assert_int_eq(memory.live, live);
             drape_sim_destroy(&sim);
             drape_model_destroy(&model);

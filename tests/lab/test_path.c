@@ -1,7 +1,6 @@
 /* test_path.c: drape_sim_path: a truss that snaps through and a column that buckles, against closed forms;
- * steps that are rejected; refusals; memory that fails. */
+ * steps that are rejected; refusals. test_modes.c has memory that fails. */
 #include "drape/lab.h"
-#include "support/failing_allocator.h"
 #include "support/scene.h"
 
 #include <gsl/gsl_sf_ellint.h>
@@ -310,45 +309,6 @@ START_TEST(wrong_requests_are_refused)
 }
 END_TEST
 
-/* Every allocation fails once: each failure is reported, and nothing leaks. */
-START_TEST(memory_that_fails_is_reported)
-{
-    static const char text[] =
-        "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 4, \"rows\": 4, "
-        "\"width\": "
-        "1, \"height\": 1}, \"material\": {\"young_modulus\": 1e4, \"thickness\": 1e-2, \"areal_density\": "
-        "0.1}, \"terms\": [\"stretch.cst\", \"bend.midedge\"], \"pins\": [{\"edge\": \"top\", \"clamp\": "
-        "true}]}], \"gravity\": [0, -1e-3, 0], \"duration\": 1}";
-    for (long at = 1, done = 0; !done; at++) {
-        failing_allocator memory = {0};
-        drape_context *ctx = failing_context(&memory);
-        drape_scene *parsed = NULL;
-        drape_model *model = NULL;
-        drape_sim *sim = NULL;
-        drape_path_def def;
-        drape_path_def_init(&def, sizeof def);
-        def.max_points = 3;
-        ck_assert_int_eq(drape_scene_parse(ctx, text, "test", &parsed), DRAPE_OK);
-        ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
-        ck_assert_int_eq(drape_sim_create(ctx, model, NULL, &sim), DRAPE_OK);
-        const long live = memory.live;
-        memory.calls = 0;
-        memory.fail_at = at;
-        const drape_status status = drape_sim_path(sim, &def);
-        done = memory.calls < at;
-        memory.fail_at = 0;
-        ck_assert_msg(status == (done ? DRAPE_OK : DRAPE_E_MEMORY), "allocation %ld: %s", at,
-                      drape_context_message(ctx));
-        ck_assert_int_eq(memory.live, live);
-        drape_sim_destroy(&sim);
-        drape_model_destroy(&model);
-        drape_scene_destroy(&parsed);
-        drape_context_destroy(&ctx);
-        ck_assert_int_eq(memory.live, 0);
-    }
-}
-END_TEST
-
 /* ---- Loads that vary in time, and a load without a potential ---- */
 
 #define STRIP                                                                                                \
@@ -413,4 +373,4 @@ END_TEST
 
 SUITE("path", a_path_has_the_full_load, a_follower_pressure_has_a_path_and_no_modes, a_truss_snaps_through,
       load_control_stops_at_a_limit, a_column_follows_the_elastica, a_path_does_not_jump_to_another,
-      wrong_requests_are_refused, memory_that_fails_is_reported)
+      wrong_requests_are_refused)
