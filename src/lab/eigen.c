@@ -130,8 +130,8 @@ drape_status lab_eigen(drape_context *ctx, const lab_operator *op, const lab_kno
     s.taken = drape_arena_take(&arena, m, sizeof *s.taken);
     drape_status status = drape_arena_status(&arena);
     if (!status) {
-        /* Another start vector for each number of known vectors: that of the last search may have lacked the
-         * part of what it missed. */
+        /* Each number of known vectors has another start vector: that of the last search may have lacked the
+         * modes that it missed. */
         lab_tangent_noise(1 + (uint64_t)s.known->count, s.residual, n);
         leave_known(&s, s.residual);
         pthread_mutex_lock(&arpack_mutex);

@@ -405,8 +405,8 @@ static drape_status check_settings(lab *l)
 }
 
 /* Reports a scene that does not compile before there is a folder, which would then hold an unwanted
- * experiment: the scene itself where it is prepared, and the first case of every series. Maps try their own
- * corners. */
+ * experiment. The scene itself is tried if the experiment prepares something with it, and the first case of
+ * every series; maps try their own corners in `plan`. */
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
@@ -524,7 +524,8 @@ static drape_status prepare(lab *l)
 
 /* ---- Reporting ---- */
 
-/* By what cases are counted that were left out: the scene, of several, or the series. */
+/* The group in which a case that was left out is counted: its scene, or its series where there is only one
+ * scene. */
 static const char *group_of(const json_t *one)
 {
     const char *scene = lab_tag_text(one, "scene");

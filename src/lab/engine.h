@@ -58,13 +58,13 @@ typedef struct lab_experiment_ops {
      * of the def are known to exist and to have steps in time. Errors:
      * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY and those of loading the scene. */
     drape_status (*plan)(lab *l);
-    /* Faults in what prepare will run, found before there is a folder. NULL: it runs nothing. */
+    /* Finds faults in what `prepare` will run, before there is a folder. NULL: `prepare` runs nothing. */
     drape_status (*check)(lab *l);
-    /* Faults of an experiment.json that is merged, before there is a folder, which lab_check_about cannot
-     * see. NULL: there are none. Errors: DRAPE_E_PARSE, DRAPE_E_ARGUMENT. */
+    /* Finds faults of the experiment.json of a merge that lab_check_about cannot see, before there is a
+     * folder. NULL: there are none to look for. Errors: DRAPE_E_PARSE, DRAPE_E_ARGUMENT. */
     drape_status (*verify)(lab *l);
-    /* Completes the request of a case: its scene and what it is compared with, if these are not those of
-     * the def and of all cases. NULL: they are. */
+    /* Sets the scene of a case, and what the case is compared with, where the experiment has several scenes.
+     * NULL: all cases are of the def's scene, and compared with l->reference. */
     void (*request)(const lab *l, size_t index, lab_request *request);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
@@ -150,8 +150,8 @@ void lab_digits(uint64_t hash, char digits[17]);
  * files, and of the compiled model where there are any. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_hash_scene(drape_context *ctx, const char *path, const drape_model *model, char digits[17]);
 
-/* The same of the scene of a request as it is now, with the settings `identified`, which are those of one
- * case for all: a scene may lack what the cases set. Errors: those of loading. */
+/* The identity of the scene of a request as its files are now, with the settings `identified`: those of one
+ * case stand for all cases, since a scene may lack what the cases set. Errors: those of loading. */
 drape_status lab_identify(drape_context *ctx, const lab_request *request, char digits[17]);
 
 /* Whether the scene still has the identity of the request. Errors: those of loading, DRAPE_E_ARGUMENT (it has

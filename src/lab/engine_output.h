@@ -18,11 +18,12 @@ drape_status lab_read_text(drape_arena *arena, const char *folder, const char *n
 /* The same as JSON, which the caller owns; NULL after a failure. Errors: also DRAPE_E_PARSE. */
 drape_status lab_read_json(drape_arena *arena, const char *folder, const char *name, json_t **object);
 
-/* results.csv: the columns that any result has, tags first. */
+/* Writes results.csv: a row for each result, a column for each number or text that any result has, tags
+ * first. */
 drape_status lab_write_csv(lab *l);
 
-/* The unit of a scene's value at a JSON pointer, as "Pa"; "" if it has none, or if it depends on other values
- * of the scene. */
+/* The unit of a scene's value at a JSON pointer, as "Pa"; "" if the value has none, or one that depends on
+ * other values of the scene. */
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);
@@ -30,14 +31,14 @@ void lab_page_heading(lab *l, const char *text);
 /* Adds a figure with its caption. */
 void lab_page_figure(lab *l, const char *svg, size_t size, const char *caption);
 
-/* A table of the page and, if `markdown` is not NULL, of that text. A text in it is neither another cell,
- * unless it has a tab, nor HTML. */
+/* A table of the page and, if `markdown` is not NULL, of that text. The text of a cell is escaped for both;
+ * a tab in it begins another cell. */
 typedef struct lab_table {
     lab *l;
     FILE *markdown;
 } lab_table;
 
-/* A row, whose cells the format separates by tabs: of the heads, and further ones. */
+/* Begins a table with a row of heads; adds a row. The format separates the cells by tabs. */
 void lab_table_begin(const lab_table *t, const char *title, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void lab_table_row(const lab_table *t, const char *format, ...) __attribute__((format(printf, 2, 3)));

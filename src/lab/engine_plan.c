@@ -105,7 +105,7 @@ static total total_cpu(stratum *strata, size_t count)
         variance += s->cases * s->cases * (1 - s->count / s->cases) * spread / s->count;
         freedom += s->count - 1;
     }
-    if (rest->count < 1 && rest->cases > 0) /* none of these is in the sample: as the mean of all others */
+    if (rest->count < 1 && rest->cases > 0) /* a stratum without a sample costs as the mean of all others */
         sum += rest->cases * spent / fmax(1, sampled);
     const double half = freedom >= 1 ? lab_student(freedom) * sqrt(variance) : NAN;
     return (total){sum, fmax(spent, sum - half), sum + half};

@@ -126,8 +126,9 @@ typedef struct sequence {
     int failed;
     int64_t rejected;   /* steps that the controller cut: there dt was not that of the case */
     size_t cut;         /* the last refinement with such steps, counted from 1; 0: none */
-    bool unrefined;     /* the knob does not refine it: there is no order */
-    bool chooses_order; /* with the knob */
+    bool unrefined;     /* the integrator chooses its substeps, and dt does not refine them: there is no order
+                           */
+    bool chooses_order; /* the integrator takes another order at another value of the knob */
     lab_line line;      /* NaN: fewer than 3 refinements have one order */
 } sequence;
 

@@ -142,8 +142,8 @@ static double resolved_error(const json_t *result)
     return lab_resolved_error(result, "error_max", RESOLVED);
 }
 
-/* The least cost at which a series reaches an error: between neighbours of which one is worse and one is
- * better, by interpolation of logarithms; else of the coarsest case that reaches it. NaN: it does not. */
+/* The least cost at which a series reaches an error: interpolated in logarithms between neighbours of which
+ * one is worse and one is better, or that of the coarsest case that reaches the error. NaN: no case does. */
 static double cost_at(const lab_series *s, double error, const json_t **at)
 {
     double least = NAN;
@@ -206,8 +206,9 @@ static void put_cheapest(const lab_table *t, const scene *s, double error)
     lab_table_row(t, "%s\t%s, %s (%.2g s)\t%s\t%s", s->name, best->name, knob, least, other, usual);
 }
 
-/* The points of the asymptotic range, from the finest on: those whose orders between neighbours are that of
- * the finest. Points within the reference's error, and cases whose steps were not all of dt, are none. */
+/* The points of the asymptotic range, from the finest on: as far as the orders between neighbours are that
+ * of the finest two. Points within the reference's error, and cases whose steps were not all of dt, do not
+ * belong to it. */
 static size_t asymptotic_range(const lab_series *s, double dt[MAX_POINTS], double error[MAX_POINTS])
 {
     size_t count = 0;

@@ -715,8 +715,8 @@ static drape_status read_result(lab *l, size_t i, const lab_quantity **quantity)
     return status;
 }
 
-/* Whether the cases are those of the axes, the cells of an integrator after those of another, and the
- * results known. */
+/* Checks that the cases are those of the axes, the cells of one integrator after those of another, and that
+ * the results to be shown are known. */
 static drape_status verify(lab *l)
 {
     space s;

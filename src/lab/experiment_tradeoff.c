@@ -117,8 +117,8 @@ static drape_status check_reference(lab *l)
 
 /* ---- Files ---- */
 
-/* The name of a file of a sequence; NULL: of the reference that was chosen. Shards in one folder each make
- * their own. */
+/* The name of a file of a sequence; s NULL: of the reference that was chosen. Each shard has reference files
+ * of its own. */
 static void name_file(const lab *l, const sequence *s, const char *ending, char name[64])
 {
     char shard[32] = "";
@@ -191,7 +191,8 @@ static bool is_sequence(const void *user, const char *name)
 
 /* ---- Runs ---- */
 
-/* Runs and saves the next level. If it does not complete, *last keeps the level before, and why. */
+/* Runs and saves the next level. If its run does not complete, *last stays the level before it, and keeps
+ * what ended the sequence. */
 static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last)
 {
     const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
@@ -333,8 +334,8 @@ static bool is_resolved(const json_t *result)
     return !isnan(resolved_error(result));
 }
 
-/* The cheapest case whose error is at most that; of one series, or NULL of any. Series with
- * too few cases do not count. NULL: there is none. */
+/* The cheapest case with at most that error, of one series (`only`) or of all (NULL) that have enough cases
+ * to be compared. NULL: no case is so close. */
 static const json_t *cheapest(all a, double error, const lab_series *only)
 {
     const json_t *best = NULL;

@@ -2,6 +2,7 @@
 #include "lab/figure.h"
 
 #include "base/hash.h"
+#include "base/pi.h"
 #include "lab/engine_output.h"
 
 #include <cairo-pdf.h>
@@ -16,7 +17,6 @@
 #define WIDTH       84.0 /* a column of a paper */
 #define POINT       (25.4 / 72)
 #define EM          (7.5 * POINT)
-#define PI          3.14159265358979323846
 #define PLOT_HEIGHT 52.0
 #define RIGHT       3.0
 #define TOP         2.5
@@ -144,7 +144,8 @@ static void put_marker(const page *p, double x, double y, lab_style s)
     static const struct {
         int corners;
         double turn; /* of the first one */
-    } shapes[] = {{4, PI / 4}, {20, 0}, {3, PI / 2}, {3, -PI / 2}, {4, PI / 2}, {5, PI / 2}};
+    } shapes[] = {{4, DRAPE_PI / 4},  {20, 0},           {3, DRAPE_PI / 2},
+                  {3, -DRAPE_PI / 2}, {4, DRAPE_PI / 2}, {5, DRAPE_PI / 2}};
     const double r = s.dash ? 0.4 : 0.55, q = s.point == 1 ? 0 : r; /* larger where no line shows the place */
     if (s.point < 4) {
         put_line(p, (double[]){x - r, y - q, x + r, y + q, NAN, NAN, x - q, y + r, x + q, y - r}, 5, s.colour,
@@ -153,7 +154,7 @@ static void put_marker(const page *p, double x, double y, lab_style s)
     }
     const int corners = shapes[s.point / 2 - 2].corners;
     for (int i = 0; i < corners; i++) {
-        const double angle = shapes[s.point / 2 - 2].turn + 2 * PI * i / corners;
+        const double angle = shapes[s.point / 2 - 2].turn + 2 * DRAPE_PI * i / corners;
         const double size = corners > 5 ? r : 1.35 * r; /* areas alike */
         (i ? cairo_line_to : cairo_move_to)(p->cairo, across(x + size * cos(angle)),
                                             down(p, y + size * sin(angle)));
@@ -188,7 +189,7 @@ static void put_text(const page *p, double x, double y, anchor at, const char *t
     cairo_save(p->cairo);
     set_colour(p, LAB_BLACK);
     cairo_translate(p->cairo, across(x), down(p, y));
-    cairo_rotate(p->cairo, at == UPRIGHT ? -PI / 2 : 0);
+    cairo_rotate(p->cairo, at == UPRIGHT ? -DRAPE_PI / 2 : 0);
     cairo_move_to(p->cairo, -shares[at] * (first.x_advance + second.x_advance), across(0.36 * EM));
     cairo_show_text(p->cairo, shown);
     cairo_rel_move_to(p->cairo, 0, across(-0.45 * EM));

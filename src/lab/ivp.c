@@ -97,7 +97,7 @@ static double residual_of_size(const lab_ivp *s)
     return s->node_mass * s->size / (end * end);
 }
 
-/* Near rounding. */
+/* The smallest tolerance: a residual near rounding. */
 static double least_tolerance(const lab_ivp *s)
 {
     return 1e-13 * residual_of_size(s);

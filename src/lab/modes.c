@@ -19,6 +19,7 @@
 #include "base/def.h"
 #include "base/elementary.h"
 #include "base/finite.h"
+#include "base/pi.h"
 #include "drape/lab.h"
 #include "lab/eigen.h"
 #include "lab/tangent.h"
@@ -28,7 +29,6 @@
 #include <math.h>
 #include <string.h>
 
-#define PI 3.14159265358979323846
 /* The shift, in parts of the largest diagonal entry of M^-1 K: far enough from 0 that the rigid motions of a
  * free sheet leave S regular, near enough that they are distinct from the slowest bending. */
 #define SHIFT      1e-11
@@ -149,8 +149,8 @@ static drape_status prepare_buckling(problem *p)
 
 /* ---- Search ---- */
 
-/* Searches for more pairs, and puts them among the others. Buckling: those with op <= 0 are loads in the
- * other direction. */
+/* Searches for more pairs, and inserts them into those that were found before. In buckling, pairs with op <=
+ * 0 belong to loads in the other direction, and are left out. */
 static drape_status search(problem *p, int32_t wanted)
 {
     const lab_operator op = {.n = p->n, .user = p, .apply = apply, .inner = inner};
@@ -353,7 +353,7 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
                  : mode->value > 0               ? DRAPE_MODE_VIBRATION
                                                  : DRAPE_MODE_UNSTABLE;
     mode->error = mode->kind == DRAPE_MODE_ZERO ? INFINITY : mode->error;
-    mode->frequency = mode->kind == DRAPE_MODE_VIBRATION ? sqrt(mode->value) / (2 * PI) : 0;
+    mode->frequency = mode->kind == DRAPE_MODE_VIBRATION ? sqrt(mode->value) / (2 * DRAPE_PI) : 0;
     return inverse <= MAX_ERROR
                ? DRAPE_OK
                : drape_fail(p->ctx, DRAPE_E_SOLVER,
@@ -362,8 +362,9 @@ static drape_status fill_mode(problem *p, const eigenpair *pair, double *shape, 
                             mode->value, inverse);
 }
 
-/* If more motions than those of a rigid body have no stiffness within rounding, and there are others beside
- * the modes, the modes are some of a space in which any others would do as well. */
+/* Refuses modes without stiffness that are an arbitrary choice: if more motions than those of a rigid body
+ * have no stiffness within rounding, and not all of them are among the modes, any others of their space would
+ * do as well. */
 static drape_status refuse_part_of_slack(problem *p, int32_t count, const drape_modes *found, double *scratch)
 {
     drape_mode next = {.kind = DRAPE_MODE_ZERO};

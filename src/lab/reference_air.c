@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#define PI 3.14159265358979323846
-
 /* ---- Terminal velocity ----
  *
  * A sheet falls, 0.1 kg/m2 in air of 1.225 kg/m3: broadside by either law of the normal force, which agree
@@ -76,7 +74,7 @@ static int flutter_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT
                       .terms =
                           SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'drag.wind', 'law': 'plate', "
                                        "'density': %.17g, 'coefficient': 1, 'wind': [%.17g, 0, 0]}",
-                                       8 * KAPPA / (4 + PI), sqrt(c->load / KAPPA)),
+                                       8 * KAPPA / (4 + DRAPE_PI), sqrt(c->load / KAPPA)),
                       .pins = "{'edge': 'left'}, {'edge': 'right', 'normal': [0, 1, 0]}",
                       .integrator = "'method': 'midpoint'", .duration = SECONDS);
 }
@@ -102,7 +100,7 @@ static drape_status measure_flutter(drape_reference_run *run, double *value)
     const double *x = drape_sim_positions(run->sim), end = drape_model_duration(run->model);
     double *v = drape_arena_take(&run->arena, n, sizeof *v);
     for (size_t i = 0; v && i < n; i += 3)
-        v[i + 1] = START * (sin(PI * x[i]) + sin(2 * PI * x[i]));
+        v[i + 1] = START * (sin(DRAPE_PI * x[i]) + sin(2 * DRAPE_PI * x[i]));
     drape_status status = v ? lab_settle(run, v) : DRAPE_E_MEMORY;
     const double first = largest_until(run, end / 4, &status), second = largest_until(run, end / 2, &status);
     *value = second > 1000 * first;
@@ -144,7 +142,7 @@ static int flag_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
     return SHEET_TEXT(text, RIBBON, .areal_density = 1 - b,
                       .terms = SHEET_FORMAT("'stretch.cst', 'bend.midedge', {'type': 'air.added_mass', "
                                             "'span': 0.05, 'density': %.17g, 'wind': [%.17g, 0, 0]}",
-                                            b / (0.05 * PI / 4), c->load / sqrt(b)),
+                                            b / (0.05 * DRAPE_PI / 4), c->load / sqrt(b)),
                       .pins = "{'edge': 'left', 'clamp': true}",
                       .gravity = {flags[which].weight / (1 - b), 0, 0}, .integrator = "'method': 'trbdf2'",
                       .duration = flags[which].seconds);

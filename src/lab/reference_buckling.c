@@ -45,7 +45,7 @@ DRAPE_REFERENCE(
 static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     enum { EDGES = 8, STRIPS = 240 }; /* across and along the strip */
-    const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81;
+    const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3;
     const double length =
         (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* two pinned rows clamp the strip between them */
     return SHEET_TEXT(text, .grid = "equilateral",
@@ -55,9 +55,9 @@ static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
                       .young_modulus =
                           12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness),
                       .poisson_ratio = poisson, .thickness = thickness,
-                      .areal_density = c->load * STRIP_RIGIDITY / (gravity * pow(length, 3)),
+                      .areal_density = c->load * STRIP_RIGIDITY / (GRAVITY * pow(length, 3)),
                       .terms = "'stretch.edge', 'bend.hinge'", .pins = "{'row': 0}, {'row': 1}",
-                      .gravity = {0, -gravity, 0}, .tolerance = 1e-9);
+                      .gravity = {0, -GRAVITY, 0}, .tolerance = 1e-9);
 }
 
 DRAPE_REFERENCE(lateral_buckling_hinges,

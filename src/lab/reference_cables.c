@@ -4,9 +4,6 @@
 #include <gsl/gsl_sf_bessel.h>
 #include <math.h>
 
-#define GRAVITY 9.81
-#define PI      3.14159265358979323846
-
 /* ---- The sag of a strip of length 1.2 m between ends 1 m apart ---- */
 
 /* The right end starts at 1.2 m and is moved to 1 m. */
@@ -57,7 +54,7 @@ static double frequency(double mode)
 
 static double step_size(double mode)
 {
-    return 2 * PI / frequency(mode) / STEPS;
+    return 2 * DRAPE_PI / frequency(mode) / STEPS;
 }
 
 static int chain_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
@@ -89,7 +86,7 @@ static drape_status measure_frequency(drape_reference_run *run, double *value)
             found++;
         }
     }
-    *value = found == 4 ? 4 * PI / crossing : NAN; /* four crossings after the start: two periods */
+    *value = found == 4 ? 4 * DRAPE_PI / crossing : NAN; /* four crossings after the start: two periods */
     return status;
 }
 

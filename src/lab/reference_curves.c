@@ -81,7 +81,7 @@ DRAPE_REFERENCE(roller_tension, .entry.summary = "force per width of a sheet dra
 /* The lower edge moves about the upper one, so that the yarns between them keep their length at the end. */
 static int sheared(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
-    const double angle = c->parameter * (acos(-1) / 180);
+    const double angle = c->parameter * DEGREE;
     return SHEET_TEXT(
         text, SQUARE, MOVED, .grid = "square", .columns = 2, .rows = 2,
         /* [degrees], [N/m]: of the size and shape that a KES shear test gives, but not those of a fabric. */
@@ -100,7 +100,7 @@ static drape_status measure_shear(drape_reference_run *run, double *value)
     drape_status status = lab_advance(run);
     if (!status)
         status = lab_pull(run, 2, -SIDE, force);
-    *value = (force[0] + force[2] * tan(run->parameter * (acos(-1) / 180))) / SIDE;
+    *value = (force[0] + force[2] * tan(run->parameter * DEGREE)) / SIDE;
     return status;
 }
 

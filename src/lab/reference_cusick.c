@@ -6,10 +6,8 @@
 
 #include <math.h>
 
-#define PI      3.14159265358979323846
-#define INNER   0.09 /* [m] */
-#define OUTER   0.15
-#define GRAVITY 9.81
+#define INNER 0.09 /* [m] */
+#define OUTER 0.15
 #define OVERHANG                                                                                             \
     .grid = "annulus", .mesh = "'inner_radius': 0.09, 'outer_radius': 0.15", .gravity = {0, -GRAVITY, 0},    \
     .pins = "{'edge': 'top', 'clamp': true}"
@@ -79,7 +77,7 @@ static double drape_of(const drape_reference_run *run)
 {
     const int32_t nodes = drape_model_node_count(run->model);
     const double *rim = drape_sim_positions(run->sim) + 3 * (size_t)(nodes - SPOKES);
-    double twice = 0, inner = PI * INNER * INNER, outer = PI * OUTER * OUTER;
+    double twice = 0, inner = DRAPE_PI * INNER * INNER, outer = DRAPE_PI * OUTER * OUTER;
     for (size_t i = 0; i < SPOKES; i++) {
         const double *a = rim + 3 * i, *b = rim + 3 * ((i + 1) % SPOKES);
         twice += a[2] * b[0] - a[0] * b[2];

@@ -8,8 +8,6 @@
 #include <gsl/gsl_roots.h>
 #include <math.h>
 
-#define GRAVITY 9.81 /* [m/s2] */
-
 static const double places[] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16,
                                 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32};
 _Static_assert(DRAPE_FABRIC_COUNT <= sizeof places / sizeof *places, "a place for every fabric");

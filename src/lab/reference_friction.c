@@ -3,9 +3,6 @@
 
 #include <math.h>
 
-#define GRAVITY 9.81
-#define DEGREE  (3.14159265358979323846 / 180)
-
 /* A sheet on a plane with normal y. */
 #define TABLE                                                                                                \
     .columns = 4, .rows = 3, .width = 0.3, .height = 0.2,                                                    \

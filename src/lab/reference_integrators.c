@@ -8,8 +8,7 @@
 
 /* ---- Free fall ---- */
 
-#define GRAVITY 9.81
-#define TIME    0.5
+#define TIME 0.5
 
 /* In n steps of backward Euler a sheet falls by g h^2 n (n + 1)/2, exactly. */
 static double fallen(double n)
@@ -38,7 +37,6 @@ DRAPE_REFERENCE(free_fall, .entry.summary = "distance fallen in 0.5 s", .unit = 
 
 #define SPEED       1e-5 /* [m/s] at the start */
 #define OMEGA       1.41421356237309504880
-#define PI          3.14159265358979323846
 #define PHASE_STEPS 50
 
 static drape_status advance(drape_reference_run *run, int steps)
@@ -164,12 +162,12 @@ DRAPE_REFERENCE(oscillator_verlet, PHASE("'verlet', 'substeps': 1"), DRAPE_CASES
  * motion. */
 static double turned(double turns)
 {
-    return cos(2 * PI * turns);
+    return cos(2 * DRAPE_PI * turns);
 }
 
 static drape_status measure_velocity(drape_reference_run *run, double *value)
 {
-    drape_status status = drape_sim_advance(run->sim, 2 * PI * run->parameter / OMEGA);
+    drape_status status = drape_sim_advance(run->sim, 2 * DRAPE_PI * run->parameter / OMEGA);
     *value = drape_sim_velocities(run->sim)[3 * 2 + 2] / -SPEED;
     return status;
 }
@@ -191,7 +189,7 @@ DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the star
 
 static double swing(double degrees)
 {
-    return 2 / PI * gsl_sf_ellint_Kcomp(sin(degrees * PI / 360), GSL_PREC_DOUBLE);
+    return 2 / DRAPE_PI * gsl_sf_ellint_Kcomp(sin(degrees * DRAPE_PI / 360), GSL_PREC_DOUBLE);
 }
 
 /* Half a period passes from the first to the second crossing of the vertical. */

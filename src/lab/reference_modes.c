@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-#define PI        3.14159265358979323846
 #define SQRT_1000 31.622776601683793
 #define SQRT_910  30.166206257996713
 
@@ -58,7 +57,7 @@ DRAPE_REFERENCE(membrane_frequency, .entry.summary = "frequency of a square memb
 /* P L^2/B of a strip clamped at one end: pi^2 (n - 1/2)^2. */
 static double column(double mode)
 {
-    return PI * PI * (mode - 0.5) * (mode - 0.5);
+    return DRAPE_PI * DRAPE_PI * (mode - 0.5) * (mode - 0.5);
 }
 
 /* constants: the force at the free end in parts of B/L^2, in the direction of the strip; it stays so. */
@@ -109,8 +108,8 @@ static drape_status measure_clamped(drape_reference_run *run, double *value)
 
 DRAPE_REFERENCE(euler_clamped, .entry.summary = "P L^2/B at which a strip clamped at both ends buckles",
                 .unit = "1", DRAPE_CASES(0), .model = "stretch.cst, bend.midedge; irregular; modes",
-                .entry.reference = "4 pi^2; Euler 1744", .tolerance = 0.005, DRAPE_KNOWN(4 * PI * PI),
-                .measure = measure_clamped, .low = 0.9, .high = 1.1,
+                .entry.reference = "4 pi^2; Euler 1744", .tolerance = 0.005,
+                DRAPE_KNOWN(4 * DRAPE_PI * DRAPE_PI), .measure = measure_clamped, .low = 0.9, .high = 1.1,
                 /* P is E h times the share of the length by which an end is pushed in. */
                 SHEET(FREE_STRIP(0.004), .columns = 81, .rows = 4, .height = 0.02, .tolerance = 1e-11,
                       .pins = "{'edge': 'left', 'clamp': true}, {'edge': 'right', 'clamp': true, "
@@ -140,4 +139,4 @@ DRAPE_REFERENCE(bent_column, .entry.summary = "w/L of the end of a strip that ha
                 .entry.reference = "w/L = 2 k/K(k), P L^2/B = K(k)^2; Euler 1744", .tolerance = 0.005,
                 DRAPE_KNOWN(0.37997960564706629, 0.64878361363058978, 0.7885758056925356),
                 .scene = column_scene, .measure = measure_bent,
-                .constants = {PI * PI / 4 /* at factor 1 the load is Euler's */});
+                .constants = {DRAPE_PI * DRAPE_PI / 4 /* at factor 1 the load is Euler's */});

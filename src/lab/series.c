@@ -59,9 +59,9 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
 {
     const bool own = integrator->own_steps;
     drape_status status = DRAPE_OK;
-    /* The limits of its order: 2 and 5 if it has the parameter max_order and the def does not set it;
-     * otherwise 0, for none, alone. Each series has one: a line through points of different limits has no
-     * meaning. */
+    /* An integrator with the parameter max_order is run with its order limited to 2 and to 5, unless the def
+     * sets the limit: a series each, because a line through points of different limits has no meaning. 0: no
+     * limit is set. */
     bool chosen = !lab_has_param(&integrator->entry, "max_order");
     for (size_t i = 0; i < l->def->setting_count; i++)
         chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;

@@ -125,7 +125,7 @@ double lab_chord(const drape_reference_run *run)
 {
     double tip[3];
     lab_tip(run, tip);
-    return atan2(-tip[1], tip[0]) * (180 / 3.14159265358979323846);
+    return atan2(-tip[1], tip[0]) * (180 / DRAPE_PI);
 }
 
 double lab_mean(const drape_reference_run *run, const double *values, size_t k)

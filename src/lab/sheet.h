@@ -2,8 +2,12 @@
 #ifndef DRAPE_LAB_SHEET_H
 #define DRAPE_LAB_SHEET_H
 
+#include "base/pi.h"
 #include "drape/lab.h"
 #include "lab/reference.h"
+
+#define DEGREE  (DRAPE_PI / 180)
+#define GRAVITY 9.81 /* [m/s2] */
 
 /* A scene of one cloth. Members that are 0 have the defaults given here, or are not in the scene. Texts are
  * JSON, in which ' stands for ", and go into the text of the scene as they are. */

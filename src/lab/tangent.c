@@ -70,16 +70,18 @@ static drape_status read_state(lab_tangent *t, bool needs_potential)
     lab_tangent_evaluate(t, now->x, t->factor, force, NULL, NULL);
     for (int64_t i = 0; i < t->pattern->n; i++)
         t->force = fmax(t->force, fabs(force[i]));
-    /* A friction that does not slip has no stiffness, and one that slips none that is symmetric: both are
-     * left out. What else is not symmetric, as drag.wind in its own wind, is no part of K. */
+    /* Friction is left out of K: where it sticks it has no stiffness, and where it slips none that is
+     * symmetric. Other parts that are not symmetric, such as that of drag.wind in its own wind, do not belong
+     * to K either. */
     if (drape_system_is_symmetric(t->system))
         lab_tangent_is_symmetric(t, t->values);
     else
         drape_system_symmetrize(t->system, &point, 0, t->values);
     if (!needs_potential || !t->follows)
         return DRAPE_OK;
-    /* Refuses loads without a potential, by the stiffness of these alone: as the cloth is held it may be
-     * symmetric after all, as under the pressure on cloth that is pinned all round. */
+    /* Refuses loads without a potential. The stiffness of these loads alone decides, because that of the
+     * cloth may be symmetric all the same where the cloth is held, as under a pressure on cloth that is pinned
+     * all round. */
     drape_system_jacobian_without(t->system, &point, 0, 0, t->potential, t->scratch);
     const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
     return asymmetry > MAX_ASYMMETRY
