@@ -285,9 +285,9 @@ drape_status lab_write_page(lab *l, const char *title)
 
 /* ---- Units ----
  *
- * A pointer tells in which table a name is to be looked up, "/cloth/0/terms/2/stiffness" in that of the terms,
- * but not in which entry, which is in the scene. A name to which entries give different units has no unit
- * here. */
+ * A pointer tells in which table a name is to be looked up, "/cloth/0/terms/2/stiffness" in that of the
+ * terms, but not in which entry, which is in the scene. A name to which entries give different units has no
+ * unit here. */
 
 static const struct {
     const char *part; /* of the pointer */

@@ -80,8 +80,8 @@ static drape_status read_state(lab_tangent *t, bool needs_potential)
     if (!needs_potential || !t->follows)
         return DRAPE_OK;
     /* Refuses loads without a potential. The stiffness of these loads alone decides, because that of the
-     * cloth may be symmetric all the same where the cloth is held, as under a pressure on cloth that is pinned
-     * all round. */
+     * cloth may be symmetric all the same where the cloth is held, as under a pressure on cloth that is
+     * pinned all round. */
     drape_system_jacobian_without(t->system, &point, 0, 0, t->potential, t->scratch);
     const double asymmetry = drape_pattern_asymmetry(t->pattern, t->scratch);
     return asymmetry > MAX_ASYMMETRY
