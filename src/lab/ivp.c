@@ -172,11 +172,7 @@ static drape_status write_file(const lab_ivp *s, const char *path, const char *h
     *strrchr(folder, '/') = 0;
     drape_status status = drape_folder_make(s->arena->ctx, folder);
     if (!status)
-        status = drape_file_create(s->arena->ctx, strlen(path), &file);
-    if (!status) {
-        drape_file_name(&file, "%s", path);
-        status = drape_file_begin(&file);
-    }
+        status = drape_export_begin(s->arena->ctx, NULL, path, &file);
     if (!status) {
         drape_file_put(&file, head, head_size);
         drape_file_put(&file, data, size);
@@ -207,49 +203,41 @@ static json_t *provenance_of(const lab_ivp *s)
                      drape_model_node_count(s->model));
 }
 
-/* Refuses an array of another kind or shape, and says which would be right. */
-static drape_status check_array(const lab_ivp *s, const char *path, const drape_npy *array)
+/* The frames (time_count x nodes x 3) in the bytes of an NPY file, which are in the arena, with the start
+ * before them or without; frees the bytes. Refuses an array of another kind or shape, and says which would be
+ * right. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+static drape_status take_frames(const lab_ivp *s, const char *path, char *bytes, size_t size, double **x)
 {
-    char shape[160];
+    drape_context *ctx = s->arena->ctx;
     const int32_t nodes = drape_model_node_count(s->model);
     const int64_t times = (int64_t)s->time_count;
-    drape_npy_shape_text(array, shape, sizeof shape);
-    if (strcmp(array->type, "<f8") != 0)
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+    const size_t numbers = 3 * (size_t)nodes, frame = 8 * numbers;
+    char shape[160];
+    drape_npy array;
+    if (!drape_npy_read(bytes, size, &array))
+        return drape_fail(ctx, DRAPE_E_PARSE,
+                          "%.400s: not an array as numpy.save writes it: its header cannot be read", path);
+    if (strcmp(array.type, "<f8") != 0)
+        return drape_fail(ctx, DRAPE_E_PARSE,
                           "%.300s: its numbers are '%s'; they must be float64, '<f8': numpy's astype(float)",
-                          path, array->type);
-    if (array->fortran)
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+                          path, array.type);
+    if (array.fortran)
+        return drape_fail(ctx, DRAPE_E_PARSE,
                           "%.300s: it is in Fortran order; it must be in C order: numpy's ascontiguousarray",
                           path);
-    if (array->dims != 3 || array->shape[2] != 3 || array->shape[1] != nodes ||
-        (array->shape[0] != times && array->shape[0] != times + 1))
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+    drape_npy_shape_text(&array, shape, sizeof shape);
+    if (array.dims != 3 || array.shape[2] != 3 || array.shape[1] != nodes ||
+        (array.shape[0] != times && array.shape[0] != times + 1))
+        return drape_fail(ctx, DRAPE_E_PARSE,
                           "%.300s: its shape is %s; it must be (%" PRId64 ", %" PRId32
                           ", 3), frames x nodes x "
                           "(x, y, z), a frame every %.9g s, or one more with the start",
                           path, shape, times, nodes, s->interval);
-    return DRAPE_OK;
-}
-
-/* The frames (time_count x nodes x 3) in the bytes of an NPY file, which are in the arena, with the start
- * before them or without; frees the bytes. Errors: DRAPE_E_PARSE, DRAPE_E_MEMORY. */
-static drape_status take_frames(const lab_ivp *s, const char *path, char *bytes, size_t size, double **x)
-{
-    const size_t numbers = 3 * (size_t)drape_model_node_count(s->model), frame = 8 * numbers;
-    drape_npy array;
-    if (!drape_npy_read(bytes, size, &array))
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.400s: not an array as numpy.save writes it: its header cannot be read", path);
-    drape_status status = check_array(s, path, &array);
-    if (status)
-        return status;
-    const size_t before = (size_t)array.shape[0] - s->time_count;
-    if (size != array.data + frame * (size_t)array.shape[0])
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+    const size_t frames = (size_t)array.shape[0], before = frames - s->time_count;
+    if (size != array.data + frame * frames)
+        return drape_fail(ctx, DRAPE_E_PARSE,
                           "%.400s: its data are not as long as its header says: %zu bytes instead of %zu",
-                          path, size - (size < array.data ? size : array.data),
-                          frame * (size_t)array.shape[0]);
+                          path, size - (size < array.data ? size : array.data), frame * frames);
     double *copy = *x = drape_arena_take(s->arena, s->time_count, frame);
     if (!copy)
         return DRAPE_E_MEMORY;
@@ -257,48 +245,43 @@ static drape_status take_frames(const lab_ivp *s, const char *path, char *bytes,
     drape_arena_release(s->arena, bytes);
     for (size_t i = 0; i < numbers * s->time_count; i++)
         if (!(fabs(copy[i]) <= LARGEST))
-            return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                              "%.400s: frame %zu, at %.9g s, node %zu: %g is %s", path, i / numbers + before,
-                              s->times[i / numbers], i % numbers / 3, copy[i],
+            return drape_fail(ctx, DRAPE_E_PARSE, "%.400s: frame %zu, at %.9g s, node %zu: %g is %s", path,
+                              i / numbers + before, s->times[i / numbers], i % numbers / 3, copy[i],
                               isfinite(copy[i]) ? "too large for a root mean square" : "not a finite number");
     return DRAPE_OK;
 }
 
-/* The positions, whose bytes must be those that the JSON describes. */
-static drape_status read_positions(lab_ivp *s, const char *path, const json_t *about)
-{
-    char *bytes, digits[17];
-    size_t size;
-    drape_status status = lab_read_text(s->arena, NULL, path, &bytes, &size);
-    if (status)
-        return status;
-    lab_digits(drape_hash_bytes(DRAPE_HASH_START, bytes, size), digits);
-    if (strcmp(digits, lab_text(about, "data_hash")) != 0)
-        return drape_fail(s->arena->ctx, DRAPE_E_PARSE,
-                          "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",
-                          path, s->name);
-    s->reference.frames = s->reference.room = (int64_t)s->time_count;
-    s->reference.size = 3 * (size_t)drape_model_node_count(s->model);
-    status = take_frames(s, path, bytes, size, &s->reference.x);
-    s->reference.frames = status ? 0 : s->reference.frames;
-    return status;
-}
-
+/* The bytes of the positions must be those that the JSON describes. */
 drape_status lab_ivp_read_reference(lab_ivp *s)
 {
+    drape_context *ctx = s->arena->ctx;
     json_t *about = NULL;
+    char *bytes, digits[17];
+    size_t size;
+    lab_trace *reference = &s->reference;
     const char *path = file_of(s, "references", "json"), *data = file_of(s, "references", "npy");
     drape_status status = path && data ? lab_read_json(s->arena, NULL, path, &about) : DRAPE_E_MEMORY;
     if (!status && strcmp(lab_text(about, "scene_hash"), s->hash) != 0)
         status =
-            drape_fail(s->arena->ctx, DRAPE_E_PARSE,
+            drape_fail(ctx, DRAPE_E_PARSE,
                        "%.400s: of another version of the scene; `drape ivp reference %.300s` makes it anew",
                        path, s->path);
     s->error = lab_number(about, "error");
     if (!status && !(s->error >= 0))
-        status = drape_fail(s->arena->ctx, DRAPE_E_PARSE, "%.400s: it has no number \"error\"", path);
+        status = drape_fail(ctx, DRAPE_E_PARSE, "%.400s: it has no number \"error\"", path);
     if (!status)
-        status = read_positions(s, data, about);
+        status = lab_read_text(s->arena, NULL, data, &bytes, &size);
+    if (!status) {
+        lab_digits(drape_hash_bytes(DRAPE_HASH_START, bytes, size), digits);
+        status =
+            strcmp(digits, lab_text(about, "data_hash")) == 0
+                ? take_frames(s, data, bytes, size, &reference->x)
+                : drape_fail(ctx, DRAPE_E_PARSE,
+                             "%.400s: damaged: its bytes are not those that %.60s.json beside it describes",
+                             data, s->name);
+    }
+    reference->size = 3 * (size_t)drape_model_node_count(s->model);
+    reference->frames = reference->room = status ? 0 : (int64_t)s->time_count;
     json_decref(about);
     return status;
 }
