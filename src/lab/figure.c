@@ -335,28 +335,20 @@ void lab_figure_begin(lab *l, lab_figure *f, const char *name)
     }
 }
 
-static void put_value(lab_figure *f, double value)
-{
-    double *values = grow(f, f->values, f->used, sizeof *values);
-    if (!values)
-        return;
-    f->values = values;
-    f->values[f->used++] = value;
-}
-
-/* A block begins with the number of its values. */
 void lab_figure_data(lab_figure *f)
 {
     f->block = f->used;
-    put_value(f, 0);
 }
 
 static void put_values(lab_figure *f, const double *values, size_t count)
 {
-    for (size_t i = 0; i < count; i++)
-        put_value(f, values[i]);
-    if (!f->failed)
-        f->values[f->block] += (double)count;
+    for (size_t i = 0; i < count; i++) {
+        double *grown = grow(f, f->values, f->used, sizeof *grown);
+        if (!grown)
+            return;
+        f->values = grown;
+        f->values[f->used++] = values[i];
+    }
 }
 
 void lab_figure_point(lab_figure *f, double x, double y)
@@ -372,13 +364,13 @@ void lab_figure_box(lab_figure *f, double left, double right, double bottom, dou
 /* Of the last block; not without data. */
 static bool add_element(lab_figure *f, int kind, lab_style style)
 {
-    if (f->failed || f->values[f->block] == 0)
+    if (f->failed || f->used == f->block)
         return false;
     lab_element *elements = grow(f, f->elements, (size_t)f->element_count, sizeof *elements);
     if (!elements)
         return false;
     f->elements = elements;
-    f->elements[f->element_count++] = (lab_element){kind, f->block, style};
+    f->elements[f->element_count++] = (lab_element){kind, f->block, f->used - f->block, style};
     return true;
 }
 
@@ -436,7 +428,7 @@ static double lowest_point(const lab_figure *f, double left, lab_axis axes[2])
 {
     double lowest = INFINITY;
     for (int e = 0; e < f->element_count; e++) {
-        const double *xy = f->values + f->elements[e].block + 1, *end = xy + (size_t)xy[-1];
+        const double *xy = f->values + f->elements[e].first, *end = xy + f->elements[e].count;
         for (; xy < end; xy += 2) {
             lowest = xy[0] > left ? fmin(lowest, xy[1]) : lowest;
             for (int k = 0; axes && k < 2; k++) {
@@ -498,9 +490,9 @@ void lab_figure_swatch(lab_figure *f, int colour, bool hatched, const char *text
     add_entry(f, (lab_entry){.style = {.colour = colour}, .swatch = true, .hatched = hatched}, text);
 }
 
-/* ---- Layout ---- */
+/* ---- Drawing ---- */
 
-/* The frame and the legend below it: as many columns as fit. */
+/* The frame and the legend below it. */
 typedef struct layout {
     double left, bottom, height; /* of the frame: its corner; of the whole */
     double scale;                /* bottom of the bar of the scale */
@@ -513,8 +505,6 @@ static bool has_scale(const lab_figure *f)
 {
     return f->scale.to > f->scale.from;
 }
-
-/* ---- Drawing ---- */
 
 static void put_legend(const lab_figure *f, const layout *at, const page *p)
 {
@@ -562,8 +552,8 @@ static void place(const lab_figure *f, const layout *at, double x, double y, dou
 
 static void draw_element(const lab_figure *f, const layout *at, const lab_element *e, const page *p)
 {
-    const double *data = f->values + e->block + 1;
-    const size_t count = (size_t)f->values[e->block];
+    const double *data = f->values + e->first;
+    const size_t count = e->count;
     double low[2], high[2], *xy;
     switch (e->kind) {
     case CURVE:

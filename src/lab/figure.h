@@ -65,8 +65,8 @@ typedef struct lab_entry {
 } lab_entry;
 
 typedef struct lab_element {
-    int kind;     /* of figure.c */
-    size_t block; /* of data */
+    int kind;            /* of figure.c */
+    size_t first, count; /* its values */
     lab_style style;
 } lab_element;
 
@@ -79,7 +79,7 @@ typedef struct lab_figure {
     lab_axis scale;        /* of the colours of LAB_SCALED boxes, drawn below the frame; to <= from: none */
     double plot_height;    /* [mm] of the frame; default 52 */
     double *values;        /* (used) of all blocks of data; in the arena */
-    size_t used, block;    /* block: the last one */
+    size_t used, block;    /* block: the first value of the last one */
     lab_element *elements; /* (element_count) in the arena */
     int element_count;
     bool failed; /* out of memory */
