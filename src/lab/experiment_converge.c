@@ -264,7 +264,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
     char name[96], text[96];
     bool others = false;
     snprintf(name, sizeof name, "converge_%s", knob);
-    lab_figure_begin(l, &f, name);
+    lab_figure_begin(l, &f, name, NULL, label, "change to the next level [m]");
     for (const sequence *s = sequences; s < sequences + count; s++) {
         const lab_style style = lab_style_of(s->integrator, s->variant),
                         open = lab_style_of(s->integrator, 1);
@@ -282,8 +282,6 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count, const 
         lab_figure_curve(&f, style, text);
         others |= first > 0;
     }
-    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", label);
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, "change to the next level [m]");
     if (others)
         lab_figure_marker(&f, (lab_style){LAB_BLACK, 0, LAB_OPEN_MARKER}, "not fitted");
     lab_figure_fit(&f, strcmp(knob, "rtol") != 0 ? 2 : 1);

@@ -354,7 +354,7 @@ static drape_status draw_horizons(const tables *all)
     lab *l = all->table.l;
     lab_figure f;
     double low = 1, high = 1, last = 0;
-    lab_figure_begin(l, &f, "horizons");
+    lab_figure_begin(l, &f, "horizons", NULL, "time / duration of the scene", "growth of the perturbation");
     for (size_t i = 0; i < all->count; i++) {
         const json_t *s = all->scenes[i].about, *t = json_object_get(s, "t_s"),
                      *growth = json_object_get(s, "growth");
@@ -369,8 +369,6 @@ static drape_status draw_horizons(const tables *all)
         }
         lab_figure_curve(&f, (lab_style){palette[i % 5], 1 + (int)(i / 5 % 5), 0}, all->scenes[i].name);
     }
-    snprintf(f.axes[0].label, sizeof f.axes[0].label, "time / duration of the scene");
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, "growth of the perturbation");
     f.axes[0].to = last;
     f.axes[1].from = 0.5 * low;
     f.axes[1].to = 2 * high;

@@ -554,7 +554,7 @@ static drape_status draw_map(map *m, int third)
     if (s->count > 1)
         snprintf(name, sizeof name, "map_%s%s%s%s", integrator, number, quantity ? "_" : "",
                  quantity ? quantity->entry.name : "");
-    lab_figure_begin(m->l, &m->f, name);
+    lab_figure_begin(m->l, &m->f, name, NULL, NULL, NULL);
     set_axis(&s->axes[0], &m->f.axes[0]);
     if (s->count > 1) {
         set_axis(&s->axes[1], &m->f.axes[1]);
@@ -638,7 +638,7 @@ static drape_status draw_curves(map *m)
     int failed = 0, counts[MARKS];
     bool seen[MARKS] = {false}, stopped = false, completed = false; /* runs that have no value */
     snprintf(name, sizeof name, "curve_%s", m->quantity->entry.name);
-    lab_figure_begin(m->l, &m->f, name);
+    lab_figure_begin(m->l, &m->f, name, NULL, NULL, NULL);
     set_axis(&m->s->axes[0], &m->f.axes[0]);
     for (size_t first = 0; first < l->count; first += m->s->cells)
         failed += count_marks(m, first, counts);

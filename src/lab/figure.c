@@ -321,9 +321,13 @@ static void *grow(lab_figure *f, void *memory, size_t count, size_t size)
     return f->failed ? NULL : grown;
 }
 
-void lab_figure_begin(lab *l, lab_figure *f, const char *name)
+void lab_figure_begin(lab *l, lab_figure *f, const char *name, const char *title, const char *x_label,
+                      const char *y_label)
 {
     *f = (lab_figure){.l = l, .plot_height = PLOT_HEIGHT};
+    snprintf(f->title, sizeof f->title, "%s", title ? title : "");
+    snprintf(f->axes[0].label, sizeof f->axes[0].label, "%s", x_label ? x_label : "");
+    snprintf(f->axes[1].label, sizeof f->axes[1].label, "%s", y_label ? y_label : "");
     snprintf(f->name, sizeof f->name - 17, "%s", name);
     for (char *at = f->name; *at; at++)
         if ((unsigned char)*at > 127 || (!isalnum(*at) && (at == f->name || !strchr("-_.", *at))))

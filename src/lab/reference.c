@@ -15,12 +15,19 @@
 
 #define BISECTIONS 9 /* of a threshold: 1/512 of the interval that it is sought in */
 
+/* The value of a case in a table of values, one a case or one for all; NaN: there is none. */
+static double look_up(const drape_reference *reference, const double *values, int count, double parameter)
+{
+    for (int i = 0; values && i < count; i++)
+        if (count == 1 || reference->parameters[i] == parameter)
+            return values[i];
+    return NAN;
+}
+
 double drape_reference_expected(const drape_reference *reference, double parameter)
 {
-    for (int i = 0; i < reference->known_count; i++)
-        if (reference->known_count == 1 || reference->parameters[i] == parameter)
-            return reference->known[i];
-    return reference->expected ? reference->expected(parameter) : NAN;
+    return reference->expected ? reference->expected(parameter)
+                               : look_up(reference, reference->known, reference->known_count, parameter);
 }
 
 int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
@@ -75,10 +82,7 @@ static void judge(const drape_reference *reference, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
     v->expected = drape_reference_expected(reference, v->parameter);
-    v->documented = NAN;
-    for (int i = 0; reference->documented && i < reference->case_count; i++)
-        if (reference->parameters[i] == v->parameter)
-            v->documented = reference->documented[i];
+    v->documented = look_up(reference, reference->documented, reference->case_count, v->parameter);
     v->error = v->obtained / (reference->documented ? v->documented : v->expected) - 1;
     v->verdict = *v->message                                 ? DRAPE_OUTCOME_STOPPED
                  : !(fabs(v->error) <= reference->tolerance) ? DRAPE_OUTCOME_FAIL

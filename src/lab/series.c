@@ -141,10 +141,7 @@ drape_status lab_draw_series(lab *l, const lab_chart *c, const lab_series *list,
 {
     lab_figure f;
     bool any_negative = false;
-    lab_figure_begin(l, &f, c->name);
-    snprintf(f.title, sizeof f.title, "%s", c->title ? c->title : "");
-    snprintf(f.axes[0].label, sizeof f.axes[0].label, "%s", c->x_label);
-    snprintf(f.axes[1].label, sizeof f.axes[1].label, "%s", c->y_label);
+    lab_figure_begin(l, &f, c->name, c->title, c->x_label, c->y_label);
     for (const lab_series *s = list; s < list + count; s++) {
         const lab_style open = lab_style_of(s->integrator, 1);
         bool positive = false;
