@@ -1,8 +1,6 @@
 /* eigen.c: see eigen.h. */
 #include "lab/eigen.h"
 
-#include "lab/tangent.h"
-
 #include <arpack.h>
 #include <limits.h>
 #include <math.h>
@@ -108,6 +106,14 @@ static drape_status extract(drape_context *ctx, search *s, a_int *parameters, a_
     return DRAPE_OK;
 }
 
+void lab_noise(uint64_t seed, double *x, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        x[i] = (double)(seed >> 11) / 4503599627370496.0 - 1;
+    }
+}
+
 drape_status lab_eigen(drape_context *ctx, const lab_operator *op, const lab_known *known, int32_t wanted,
                        int32_t *found, double *value, double *vector)
 {
@@ -132,7 +138,7 @@ drape_status lab_eigen(drape_context *ctx, const lab_operator *op, const lab_kno
     if (!status) {
         /* Each number of known vectors has another start vector: that of the last search may have lacked the
          * modes that it missed. */
-        lab_tangent_noise(1 + (uint64_t)s.known->count, s.residual, n);
+        lab_noise(1 + (uint64_t)s.known->count, s.residual, n);
         leave_known(&s, s.residual);
         pthread_mutex_lock(&arpack_mutex);
         status = iterate(ctx, &s, parameters, pointers);

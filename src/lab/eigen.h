@@ -23,6 +23,10 @@ typedef struct lab_known {
     const double *vector, *product;
 } lab_known;
 
+/* Numbers between -1 and 1 without any symmetry that a mode might have: Knuth's linear congruential
+ * sequence. */
+void lab_noise(uint64_t seed, double *x, size_t count);
+
 /* Finds the `wanted` largest eigenvalues that do not belong to known vectors, largest first: value (wanted),
  * vector (wanted x n), orthogonal to the known ones and to each other in B and with u'B u = 1. wanted <=
  * n - 1 - known->count. *found <= wanted: so many have converged; fewer are no failure. An eigenvalue of

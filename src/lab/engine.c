@@ -6,7 +6,6 @@
 #include "drape/lab.h"
 
 #include "base/clock.h"
-#include "base/def.h"
 #include "base/json_read.h"
 #include "base/param.h"
 #include "io/export.h"
@@ -23,87 +22,10 @@
 
 #define ABOUT "experiment.json"
 
-void drape_lab_def_init(drape_lab_def *def, size_t struct_size)
-{
-    const drape_lab_def defaults = {.struct_size = struct_size,
-                                    .levels = 6,
-                                    .strain_limit = 0.2,
-                                    .case_seconds = 30,
-                                    .repeats = 3,
-                                    .jobs = 1,
-                                    .shard = 1,
-                                    .shards = 1};
-    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
-}
-
 void drape_lab_outcome_free(drape_lab_outcome *outcome)
 {
     free(outcome->text);
     *outcome = (drape_lab_outcome){0};
-}
-
-/* ---- What experiments share ---- */
-
-double lab_number(const json_t *object, const char *key)
-{
-    const json_t *value = json_object_get(object, key);
-    return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
-const char *lab_text(const json_t *object, const char *key)
-{
-    const char *text = json_string_value(json_object_get(object, key));
-    return text ? text : "";
-}
-
-double lab_tag_number(const json_t *result, const char *key)
-{
-    return lab_number(json_object_get(result, "tags"), key);
-}
-
-const char *lab_tag_text(const json_t *result, const char *key)
-{
-    return lab_text(json_object_get(result, "tags"), key);
-}
-
-bool lab_is_good(const json_t *result)
-{
-    return strcmp(lab_text(result, "status"), drape_status_name(DRAPE_OK)) == 0;
-}
-
-drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as)
-{
-    json_t *one = json_pack("{s:o, s:o}", "tags", tags, "settings", settings);
-    const bool failed = !one ||
-                        (same_as >= 0 && json_object_set_new(one, "same_as", json_integer(same_as))) ||
-                        json_array_append_new(l->cases, one);
-    return failed ? drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the cases") : DRAPE_OK;
-}
-
-const drape_integrator_ops *lab_find_integrator(const char *name)
-{
-    const int i = drape_registry_find(&drape_integrator_registry, NULL, name);
-    return i < 0 ? NULL : drape_integrators[i];
-}
-
-bool lab_has_param(const drape_entry *entry, const char *name)
-{
-    return drape_param_find(entry->params, entry->param_count, name) >= 0;
-}
-
-bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer)
-{
-    const size_t prefix = strlen("/integrator/");
-    return strncmp(pointer, "/integrator/", prefix) == 0 && strcmp(pointer + prefix, "method") != 0 &&
-           !lab_has_param(&integrator->entry, pointer + prefix);
-}
-
-bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
-{
-    for (size_t i = 0; i < l->def->integrator_count; i++)
-        if (strcmp(l->def->integrators[i], name) == 0)
-            return true;
-    return l->def->integrator_count == 0 && fallback;
 }
 
 /* ---- Lines ---- */
@@ -156,12 +78,6 @@ static drape_status read_lines(lab *l, const char *folder, int64_t *found)
     }
     closedir(entries);
     return status;
-}
-
-void lab_put_line(drape_file *file, const json_t *object)
-{
-    drape_json_put(file, object, JSON_COMPACT | JSON_REAL_PRECISION(17));
-    drape_file_put_text(file, "\n");
 }
 
 /* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller
@@ -232,22 +148,6 @@ static void keep(sweep *s, size_t i, json_t *result)
     if (def->progress)
         def->progress(def->user, (int64_t)(s->before + s->fresh), (int64_t)(s->before + s->count),
                       each * (double)(s->count - s->fresh));
-}
-
-lab_request lab_request_of(const lab *l, size_t index)
-{
-    lab_request request = {.def = l->def,
-                           .identity = lab_text(l->about, "scene_hash"),
-                           .identified = json_object_get(json_array_get(l->cases, 0), "settings"),
-                           .settings = json_object_get(json_array_get(l->cases, index), "settings"),
-                           .reference = &l->reference,
-                           .reference_error = l->reference_error,
-                           .probe = &l->probe,
-                           .seconds = l->def->case_seconds,
-                           .repeats = l->experiment->compares_costs ? l->def->repeats : 1};
-    if (l->experiment->request)
-        l->experiment->request(l, index, &request);
-    return request;
 }
 
 /* A thread: runs cases until there is none left. */

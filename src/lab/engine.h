@@ -106,15 +106,17 @@ struct lab {
     size_t page_size;
 };
 
+/* ---- engine_json.c: cases and results as JSON ---- */
+
 /* Adds a case of rank 0. Takes the references of tags and settings. same_as < 0: none. */
 drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as);
+
+/* Whether a case is run by this shard: it is its own, and not the same as another one. */
+bool lab_is_ours(const lab *l, size_t i);
 
 /* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
  * with. */
 lab_request lab_request_of(const lab *l, size_t index);
-
-/* Adds an object as a line. */
-void lab_put_line(drape_file *file, const json_t *object);
 
 /* A number or text of an object; NaN and "" where there is none. */
 double lab_number(const json_t *object, const char *key);
@@ -136,7 +138,7 @@ bool lab_has_param(const drape_entry *entry, const char *name);
  * parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
-/* ---- engine_case.c: a case, the scene with its settings, simulated and measured ---- */
+/* ---- engine_run.c: a case, the scene with its settings, simulated and measured ---- */
 
 /* The scene with its settings, and its model; model NULL: only whether it compiles. Errors: as of
  * drape_scene_load and drape_scene_compile; *scene is to be destroyed in any case. */
@@ -172,9 +174,6 @@ size_t lab_plan_sample(lab *l, size_t *cases);
 
 /* Writes plan.json, and its sentences into the summary. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_plan(lab *l);
-
-/* Whether a case is run by this shard: it is its own, and not the same as another one. */
-bool lab_is_ours(const lab *l, size_t i);
 
 /* ---- engine_schema.c: checks of experiment.json and cases.jsonl, which any program may have written ---- */
 

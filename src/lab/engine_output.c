@@ -72,6 +72,12 @@ drape_status lab_read_json(drape_arena *arena, const char *folder, const char *n
                       folder ? "/" : "", name, fault.line, fault.column, fault.text);
 }
 
+void lab_put_line(drape_file *file, const json_t *object)
+{
+    drape_json_put(file, object, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    drape_file_put_text(file, "\n");
+}
+
 static void put_field(drape_file *file, const json_t *value)
 {
     if (json_is_real(value))

@@ -18,6 +18,9 @@ drape_status lab_read_text(drape_arena *arena, const char *folder, const char *n
 /* The same as JSON, which the caller owns; NULL after a failure. Errors: also DRAPE_E_PARSE. */
 drape_status lab_read_json(drape_arena *arena, const char *folder, const char *name, json_t **object);
 
+/* Adds an object to a file, as a line. */
+void lab_put_line(drape_file *file, const json_t *object);
+
 /* Writes results.csv: a row for each result, a column for each number or text that any result has, tags
  * first. */
 drape_status lab_write_csv(lab *l);

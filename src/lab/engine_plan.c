@@ -13,7 +13,7 @@
 #include "lab/engine.h"
 
 #include "lab/engine_output.h"
-#include "lab/series.h"
+#include "lab/fit.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,12 +27,6 @@
 /* Memory that a result takes, over the length of its line: measured with lines of 0.75 KB, by the largest
  * memory of a sweep of 10 000 cases. */
 #define MEMORY_OF_TEXT 5.0
-
-bool lab_is_ours(const lab *l, size_t i)
-{
-    return i % (size_t)l->def->shards == (size_t)(l->def->shard - 1) &&
-           !json_object_get(json_array_get(l->cases, i), "same_as");
-}
 
 /* ---- The sample ---- */
 

@@ -9,6 +9,7 @@
  * the tolerance; a method that chooses its order takes another one at another rtol, and no line is fitted.
  */
 #include "lab/engine_output.h"
+#include "lab/fit.h"
 #include "lab/series.h"
 #include "model/scene.h"
 

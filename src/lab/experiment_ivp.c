@@ -4,6 +4,7 @@
  * does. Errors are relative to the size of the scene, and taken at times at which steps end.
  */
 #include "lab/engine_output.h"
+#include "lab/fit.h"
 #include "lab/ivp.h"
 #include "lab/series.h"
 

@@ -17,6 +17,7 @@
 #include "base/elementary.h"
 #include "base/finite.h"
 #include "drape/lab.h"
+#include "lab/eigen.h"
 #include "lab/tangent.h"
 #include "solvers/inertia.h"
 
@@ -260,7 +261,7 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
 static drape_status find_mode(follower *p)
 {
     drape_status status = open_step(p);
-    lab_tangent_noise(1, p->mode, p->n);
+    lab_noise(1, p->mode, p->n);
     for (int k = 0; !status && k < MODE_ITERATIONS; k++) {
         for (size_t i = 0; i < p->n; i++)
             p->a[i] = p->tangent.mass[i] * p->mode[i];

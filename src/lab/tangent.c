@@ -177,14 +177,6 @@ drape_status lab_tangent_solve(const lab_tangent *t, double *b, double *x)
     return t->solver->solve(t->factors, b, x);
 }
 
-void lab_tangent_noise(uint64_t seed, double *x, size_t count)
-{
-    for (size_t i = 0; i < count; i++) {
-        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-        x[i] = (double)(seed >> 11) / 4503599627370496.0 - 1;
-    }
-}
-
 void lab_tangent_multiply(const lab_tangent *t, const double *values, const double *x, double *y)
 {
     const drape_pattern *p = t->pattern;

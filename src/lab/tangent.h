@@ -60,10 +60,6 @@ drape_status lab_tangent_factor_definite(const lab_tangent *tangent, const doubl
 /* x = A^-1 b by the factors of the last matrix. Returns the status of the solver. */
 drape_status lab_tangent_solve(const lab_tangent *tangent, double *b, double *x);
 
-/* Numbers between -1 and 1 without any symmetry that a mode might have: Knuth's linear congruential
- * sequence. */
-void lab_tangent_noise(uint64_t seed, double *x, size_t count);
-
 /* y = A x for a symmetric matrix in the pattern. */
 void lab_tangent_multiply(const lab_tangent *tangent, const double *values, const double *x, double *y);
 

@@ -1,6 +1,6 @@
 /* test_lab.c: the measures of experiments: fitted powers, material points on other meshes, distances. */
 #include "lab/engine_output.h"
-#include "lab/series.h"
+#include "lab/fit.h"
 #include "lab/trace.h"
 #include "support/suite.h"
 

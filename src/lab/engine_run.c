@@ -1,7 +1,8 @@
-/* engine_case.c: see engine.h. */
+/* engine_run.c: see engine.h. */
 #include "lab/engine.h"
 
 #include "base/clock.h"
+#include "base/def.h"
 #include "base/hash.h"
 #include "base/vec3.h"
 #include "io/scene_copy.h"
@@ -33,6 +34,19 @@ typedef struct run {
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
+
+void drape_lab_def_init(drape_lab_def *def, size_t struct_size)
+{
+    const drape_lab_def defaults = {.struct_size = struct_size,
+                                    .levels = 6,
+                                    .strain_limit = 0.2,
+                                    .case_seconds = 30,
+                                    .repeats = 3,
+                                    .jobs = 1,
+                                    .shard = 1,
+                                    .shards = 1};
+    drape_def_fill(def, struct_size, &defaults, sizeof defaults);
+}
 
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene)
 {
