@@ -90,8 +90,8 @@ typedef struct lab_figure {
 } lab_figure;
 
 /* Begins the figure of that name; the caller sets the ends of its axes. Title and labels: NULL: none. Its
- * files are called as the name is, but for characters other than letters, digits and "-_.", and for long names,
- * where a hash tells names apart. */
+ * files are called as the name is, but for characters other than letters, digits and "-_.", and for long
+ * names, where a hash tells names apart. */
 void lab_figure_begin(lab *l, lab_figure *f, const char *name, const char *title, const char *x_label,
                       const char *y_label);
 
