@@ -24,8 +24,9 @@
 #define TURN_ANGLES    24 /* at which a turntable is framed */
 #define MIN_SIDE       16
 #define MIN_RANGE      1e-9 /* of a field whose values are all the same */
-#define PICTURE_DIGITS 5    /* smallest number of digits in the name of a frame */
-#define PICTURE_NAME   32   /* upper bound of the bytes of "frame_00000.png" */
+#define PICTURE        "frame_%05zu.png"
+#define PICTURES       "frame_#####.png" /* pattern of these names (drape_folder_matches) */
+#define PICTURE_NAME   32                /* upper bound of the bytes of "frame_00000.png" */
 
 /* Which frames are wanted. */
 typedef struct frames_def {
@@ -517,7 +518,7 @@ static drape_status draw_frames(render *r)
         status = drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->drawn);
         average(r);
         drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
-        snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
+        snprintf(name, sizeof name, PICTURE, k);
         if (!status && r->making)
             status = drape_film_add(r->making, r->pixels);
         else if (!status)
@@ -531,7 +532,7 @@ static drape_status draw_frames(render *r)
 static bool is_picture(const void *user, const char *name)
 {
     (void)user;
-    return drape_frame_is_name(name, PICTURE_DIGITS, "png");
+    return drape_folder_matches(PICTURES, name, NULL);
 }
 
 /* ---- What must not be replaced ---- */

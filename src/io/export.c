@@ -10,29 +10,21 @@
 #include "colliders/body.h"
 #include "model/model.h"
 
-/* The digits of the frame in a name that ends in _000000.ENDING, at least so many; NULL: it does not. */
-static const char *find_digits(const char *name, size_t least, const char *ending)
-{
-    const char *line = strrchr(name, '_'), *digits = line ? line + 1 : "";
-    const size_t count = strspn(digits, "0123456789");
-    return count >= least && digits[count] == '.' && strcmp(digits + count + 1, ending) == 0 ? digits : NULL;
-}
-
-bool drape_frame_is_name(const char *name, size_t least, const char *ending)
-{
-    return strncmp(name, "frame_", 6) == 0 && find_digits(name, least, ending) == name + 6;
-}
-
 bool drape_export_names(const drape_exporter_ops *ops, const char *name)
 {
-    return (ops->ending && drape_frame_is_name(name, DRAPE_FRAME_DIGITS, ops->ending)) ||
-           (ops->names && ops->names(name));
+    for (const char *const *pattern = ops->names; *pattern; pattern++)
+        if (drape_folder_matches(*pattern, name, NULL))
+            return true;
+    return false;
 }
 
 int64_t drape_export_frame_of(const drape_exporter_ops *ops, const char *name)
 {
-    const char *digits = ops->ending ? find_digits(name, DRAPE_FRAME_DIGITS, ops->ending) : NULL;
-    return digits && drape_export_names(ops, name) ? (int64_t)strtoll(digits, NULL, 10) : -1;
+    int64_t frame;
+    for (const char *const *pattern = ops->names; *pattern; pattern++)
+        if (strstr(*pattern, DRAPE_FRAME_DIGITS) && drape_folder_matches(*pattern, name, &frame))
+            return frame;
+    return -1;
 }
 
 void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
@@ -155,42 +147,31 @@ size_t drape_export_points(const drape_model *model)
 
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file)
 {
-    return drape_export_open(ctx, &(drape_export_def){.folder = folder}, name, file);
-}
-
-drape_status drape_export_open(drape_context *ctx, const drape_export_def *def, const char *name,
-                               drape_file *file)
-{
-    drape_status status = def->folder ? drape_file_create_in(ctx, def->folder, file)
-                                      : drape_file_create(ctx, strlen(name), file);
+    drape_status status =
+        folder ? drape_file_create_in(ctx, folder, file) : drape_file_create(ctx, strlen(name), file);
     if (status)
         return status;
     drape_file_name(file, "%s", name);
-    return def->resumes ? DRAPE_OK : drape_file_begin(file);
+    return drape_file_begin(file);
 }
 
-drape_status drape_export_count(drape_file *file, off_t offset, const void *number, size_t size)
+drape_status drape_export_open(const drape_export_def *def, const char *name, drape_file *file)
 {
-    const off_t before = file->kept;
-    drape_status status = drape_file_keep(file);
-    if (status)
-        return status;
-    status = drape_file_overwrite(file, offset, number, size);
-    if (status)
-        drape_file_cut(file, before);
+    drape_file **last = def->growing;
+    drape_status status = def->resumes ? drape_file_create_in(def->ctx, def->folder, file)
+                                       : drape_export_begin(def->ctx, def->folder, name, file);
+    if (!status && def->resumes)
+        drape_file_name(file, "%s", name);
+    while (*last)
+        last = &(*last)->next;
+    *last = file;
     return status;
 }
 
-drape_status drape_frames_open(drape_context *ctx, const drape_export_def *def, void *state)
+drape_status drape_export_begin_frame(const drape_export_def *def, const drape_frame *frame,
+                                      const char *ending)
 {
-    (void)ctx;
-    ((drape_frames *)state)->def = def;
-    return DRAPE_OK;
-}
-
-drape_status drape_frames_begin(const drape_export_def *def, const drape_frame *frame, const char *ending)
-{
-    drape_file_name(def->whole, DRAPE_FRAME_NAME, frame->index, ending);
+    drape_file_name(def->whole, "frame_%06" PRId64 ".%s", frame->index, ending);
     return drape_file_begin(def->whole);
 }
 

@@ -30,14 +30,16 @@ size_t drape_export_points(const drape_model *model);
 
 /* The target of the frames, known before the first one. It is valid until close. */
 typedef struct drape_export_def {
+    drape_context *ctx;
     drape_arena *arena; /* holds the memory that open takes */
     const drape_model *model;
     drape_folder *folder;
-    double frame_rate;   /* [1/s] */
-    int64_t most_frames; /* frames that a run of the scene's duration writes, including the one at its end */
-    bool durable;        /* a checkpoint may claim that each frame is on the disk */
-    bool resumes;        /* an earlier run is continued */
-    drape_file *whole;   /* for files that are written at once, one after the other */
+    double frame_rate;    /* [1/s] */
+    int64_t most_frames;  /* frames that a run of the scene's duration writes, including the one at its end */
+    bool durable;         /* a checkpoint may claim that each frame is on the disk */
+    bool resumes;         /* an earlier run is continued */
+    drape_file *whole;    /* for files that are written at once, one after the other */
+    drape_file **growing; /* the list of the files that grow, in the order in which they were opened */
     const drape_export_body *bodies; /* (body_count) of formats that want them: the colliders */
     int32_t body_count;
 } drape_export_def;
@@ -68,22 +70,21 @@ typedef struct drape_exporter_ops {
     drape_entry entry; /* summary: which files it writes; reference: definition of the format */
     size_t state_size;
     bool wants_fields, wants_bodies;
-    bool y_up;          /* the format has y up: its frames are never rotated */
-    const char *ending; /* of a file for each frame, frame_000000.ENDING; NULL: none */
+    bool y_up; /* the format has y up: its frames are never rotated */
+    const char
+        *names[5]; /* NULL-ended: patterns of the names of its files (drape_folder_matches); files of one
+                             frame have DRAPE_FRAME_DIGITS for its number */
 
-    /* Optional: refuses, with an error at pointer, a run that the format cannot hold, before anything is
+    /* Optional: refuses a run that the format cannot hold, reported at `pointer`, before anything is
      * written. def->folder is NULL. Errors: DRAPE_E_ARGUMENT. */
     drape_status (*check)(drape_context *ctx, const char *pointer, const drape_export_def *def);
 
-    /* Takes the memory, and begins the files that grow, by drape_export_open. Errors: DRAPE_E_FILE,
-     * DRAPE_E_MEMORY. */
-    drape_status (*open)(drape_context *ctx, const drape_export_def *def, void *state);
-    /* Whether the format writes a file of this name, beside those with its ending; NULL: none. One for a
-     * frame ends in _000000.ENDING. */
-    bool (*names)(const char *name);
+    /* Optional: takes the memory, and begins the files that grow, by drape_export_open: the recorder then
+     * archives, resumes, syncs and closes them. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+    drape_status (*open)(const drape_export_def *def, void *state);
 
     /* Errors: DRAPE_E_FILE. */
-    drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
+    drape_status (*write)(const drape_export_def *def, void *state, const drape_frame *frame);
 
     /* Optional, in place of write where ranks share the model (base/ranks.h) and frames show its nodes:
      * they append the positions of the nodes to this file together. settle, called then: the errno with
@@ -91,19 +92,11 @@ typedef struct drape_exporter_ops {
     drape_file *(*shared)(void *state);
     drape_status (*settle)(void *state, int error, uint64_t sum);
 
-    /* The files that grow, by number; NULL: there are no more, or the format has none. The recorder archives,
-     * resumes, syncs and closes them. */
-    drape_file *(*file)(void *state, size_t number);
-
-    /* For checkpoints, optional. archive, called between frames: archives what the format needs to know of
-     * the frames so far. cut, after open and archive have continued a run, and before its files that grow are
-     * trimmed: overwrites in them what frames after the first `frames` ones have changed, and checks its
-     * other files. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY. */
+    /* Optional: archives what the format needs to know of the frames so far, besides its files. */
     void (*archive)(void *state, drape_archive *a);
-    drape_status (*cut)(drape_context *ctx, void *state, int64_t frames);
 
     /* Optional: writes the end of the files that grow. Errors: DRAPE_E_FILE. */
-    drape_status (*close)(drape_context *ctx, void *state);
+    drape_status (*close)(const drape_export_def *def, void *state);
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
 extern const drape_registry drape_exporter_registry;
@@ -124,28 +117,16 @@ int64_t drape_export_frame_of(const drape_exporter_ops *ops, const char *name);
  * drape_file_destroy in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file);
 
-/* The same for one of a format that grows: it is not begun where a run is continued. */
-drape_status drape_export_open(drape_context *ctx, const drape_export_def *def, const char *name,
-                               drape_file *file);
+/* The same for a file that grows, which joins the list of the def. It is not begun where a run is
+ * continued. */
+drape_status drape_export_open(const drape_export_def *def, const char *name, drape_file *file);
 
-/* Ends a record of a file, then overwrites the number of its records. After a failure the file is as before.
- * Errors: DRAPE_E_FILE. */
-drape_status drape_export_count(drape_file *file, off_t offset, const void *number, size_t size);
+#define DRAPE_FRAME_DIGITS "######"
 
-/* The state of a format that has no other, and its open. */
-typedef struct drape_frames {
-    const drape_export_def *def;
-} drape_frames;
-drape_status drape_frames_open(drape_context *ctx, const drape_export_def *def, void *state);
-
-#define DRAPE_FRAME_NAME   "frame_%06" PRId64 ".%s"
-#define DRAPE_FRAME_DIGITS 6 /* minimum number of digits in these names */
-
-/* Whether a name is one of these, with at least so many digits. */
-bool drape_frame_is_name(const char *name, size_t least, const char *ending);
-
-/* Begins def->whole as the file of a frame; end it by drape_file_finish. Errors: DRAPE_E_FILE. */
-drape_status drape_frames_begin(const drape_export_def *def, const drape_frame *frame, const char *ending);
+/* Begins def->whole as the file of a frame, frame_000000.ENDING; end it by drape_file_finish. Errors:
+ * DRAPE_E_FILE. */
+drape_status drape_export_begin_frame(const drape_export_def *def, const drape_frame *frame,
+                                      const char *ending);
 
 /* ---- Pieces of OBJ ---- */
 

@@ -86,13 +86,10 @@ typedef struct blanks {
 typedef struct glb_state {
     const drape_export_def *def;
     drape_file file;
-    drape_status status; /* the first failure of what is written into blanks */
-    uint32_t room;       /* number of frames for which there is room */
-    uint32_t frames;     /* complete frames in the file */
-    char *json;          /* of the beginning of the file, with all blanks but those of the first frame */
+    uint32_t room;   /* number of frames for which there is room */
+    uint32_t frames; /* complete frames in the file */
+    char *json;      /* of the beginning of the file, until its first frame */
     size_t json_size, used;
-    size_t times_room; /* of it for the accessors of the animation: times, weights, each solid that moves */
-    size_t animation_room; /* for the animation itself: channels and samplers */
     blanks at;
     primitive *primitive;
     uint32_t primitives, triangles;
@@ -442,8 +439,7 @@ static void add_accessors(glb_state *glb)
         add(glb, ",%s,%s", text, normals);
     }
     glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->deforming * ACCESSOR_ROOM);
-    glb->times_room = TIMES_ROOM * (1 + (size_t)glb->moving);
-    glb->at.times = add_blanks(glb, glb->times_room);
+    glb->at.times = add_blanks(glb, TIMES_ROOM * (1 + (size_t)glb->moving));
     add(glb, "]");
 }
 
@@ -500,8 +496,7 @@ static void make_json(glb_state *glb)
     add_views(glb);
     add_accessors(glb);
     add_meshes(glb);
-    glb->animation_room = (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM;
-    glb->at.animation = add_blanks(glb, glb->animation_room);
+    glb->at.animation = add_blanks(glb, (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM);
     add(glb, "}");
     add_blanks(glb, 3 - (glb->used + 3) % 4);
     glb->json_size = glb->used;
@@ -539,12 +534,7 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         frames, vertices, bytes, MAX_FRAMES);
 }
 
-static bool glb_names(const char *name)
-{
-    return strcmp(name, FILE_NAME) == 0;
-}
-
-static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status glb_open(const drape_export_def *def, void *state)
 {
     glb_state *glb = state;
     drape_arena *arena = def->arena;
@@ -571,7 +561,7 @@ static drape_status glb_open(drape_context *ctx, const drape_export_def *def, vo
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     make_json(glb);
-    return drape_export_open(ctx, def, FILE_NAME, &glb->file);
+    return drape_export_open(def, FILE_NAME, &glb->file);
 }
 
 /* ---- Changes to the beginning of the file ---- */
@@ -581,8 +571,8 @@ static void overwrite(glb_state *glb, size_t at, const char *text, size_t size)
 {
     if (glb->frames == 0)
         memcpy(glb->json + at, text, size);
-    else if (!glb->status)
-        glb->status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, size);
+    else
+        drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, size);
 }
 
 static void fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
@@ -608,25 +598,15 @@ static void fill_list(glb_state *glb, size_t list, size_t width, const char *key
     }
 }
 
-static void write_word(glb_state *glb, off_t at, uint32_t word)
-{
-    unsigned char bytes[4];
-    for (int b = 0; b < 4; b++)
-        bytes[b] = (unsigned char)(word >> 8 * b);
-    if (!glb->status)
-        glb->status = drape_file_overwrite(&glb->file, at, bytes, sizeof bytes);
-}
-
 /* Writes all lengths as they are now. positions: bytes of positions and normals. */
-static drape_status write_lengths(glb_state *glb, uint32_t positions)
+static void write_lengths(glb_state *glb, uint32_t positions)
 {
-    const uint32_t binary = JSON_OFFSET + (uint32_t)glb->json_size, size = (uint32_t)glb->file.kept,
-                   length = size - binary - DRAPE_GLTF_CHUNK;
-    write_word(glb, binary, length);
-    write_word(glb, 8, size);
+    const uint32_t binary = JSON_OFFSET + (uint32_t)glb->json_size,
+                   size = (uint32_t)drape_file_end(&glb->file), length = size - binary - DRAPE_GLTF_CHUNK;
+    drape_file_overwrite_word(&glb->file, binary, length);
+    drape_file_overwrite_word(&glb->file, 8, size);
     fill(glb, glb->at.buffer_length, "%*u", LENGTH_WIDTH, length);
     fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, positions);
-    return glb->status;
 }
 
 /* ---- Frames ---- */
@@ -745,6 +725,7 @@ static drape_status write_first(glb_state *glb)
     drape_file_put(&glb->file, glb->json, glb->json_size);
     drape_file_put_word(&glb->file, length);
     drape_file_put(&glb->file, DRAPE_GLTF_BIN, 4); /* with its terminating 0 */
+    drape_file_declare(&glb->file, 0, (size_t)drape_file_end(&glb->file));
     for (size_t i = 0; i < 3 * (size_t)glb->triangles; i++)
         drape_file_put_word(&glb->file, glb->corner[i]);
     for (size_t i = 0; glb->uv && i < glb->object[0].vertices; i++) {
@@ -761,32 +742,27 @@ static drape_status write_first(glb_state *glb)
 }
 
 /* The times of an animation must strictly increase, in float32. */
-static drape_status glb_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status glb_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     glb_state *glb = state;
     if (glb->frames == glb->room)
-        return drape_fail(ctx, DRAPE_E_FILE,
+        return drape_fail(def->ctx, DRAPE_E_FILE,
                           "\"%.300s/%.200s\" has room for %u frames, those of the scene's duration",
-                          drape_folder_path(glb->file.folder), glb->file.path, glb->room);
+                          drape_folder_path(def->folder), glb->file.path, glb->room);
     float *time = &glb->times[glb->frames];
     *time = (float)frame->time;
     if (glb->frames > 0 && !(*time > time[-1]))
         *time = nextafterf(time[-1], FLT_MAX);
-    glb->status = DRAPE_OK;
     keep_places(glb, frame);
     find_differences(glb, frame);
     drape_status status;
     if (glb->frames == 0) {
         status = write_first(glb);
     } else {
-        const off_t before = glb->file.kept;
         put_frame(glb);
+        write_lengths(glb, (glb->frames + 1) * glb->frame_bytes);
+        fill_frame(glb);
         status = drape_file_keep(&glb->file);
-        if (!status && write_lengths(glb, (glb->frames + 1) * glb->frame_bytes))
-            drape_file_cut(&glb->file, before);
-        if (!status)
-            fill_frame(glb);
-        status = status ? status : glb->status;
     }
     glb->frames += !status;
     return status;
@@ -835,10 +811,10 @@ static void fill_channels(glb_state *glb)
 }
 
 /* Times and weights, n + n (n - 1) numbers, then 7 n of each object that moves. */
-static drape_status glb_close(drape_context *ctx, void *state)
+static drape_status glb_close(const drape_export_def *def, void *state)
 {
     glb_state *glb = state;
-    (void)ctx;
+    (void)def;
     if (glb->frames < 2)
         return DRAPE_OK;
     for (uint32_t i = 0; i < glb->frames; i++)
@@ -853,12 +829,10 @@ static drape_status glb_close(drape_context *ctx, void *state)
         for (uint32_t k = 0; moves && k < 4 * glb->frames; k++)
             drape_file_put_float(&glb->file, moves[k / 4 * 7 + 3 + k % 4]);
     }
-    glb->status = drape_file_keep(&glb->file);
-    if (!glb->status)
-        write_lengths(glb, glb->frames * glb->frame_bytes);
+    write_lengths(glb, glb->frames * glb->frame_bytes);
     fill_accessors(glb);
     fill_channels(glb);
-    return glb->status;
+    return drape_file_keep(&glb->file);
 }
 
 /* ---- Checkpoints ---- */
@@ -885,52 +859,6 @@ static void glb_archive(void *state, drape_archive *a)
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
 }
 
-/* Writes bytes of the JSON as they were at first, which after resuming are blanks. */
-static void restore(glb_state *glb, size_t begin, size_t end)
-{
-    overwrite(glb, begin, glb->json + begin, end - begin);
-}
-
-/* Restores a list from the text of frame `frames` on. */
-static void restore_list(glb_state *glb, size_t list, size_t width)
-{
-    const size_t close = list + LIST_HEAD + glb->room * width;
-    if (glb->frames > 1)
-        restore(glb, list + LIST_HEAD + (glb->frames - 1) * width, close);
-    else
-        restore(glb, list, close + 1);
-}
-
-/* Removes the animation and targets. */
-static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
-{
-    glb_state *glb = state;
-    const blanks *at = &glb->at;
-    const size_t frame = (size_t)glb->deforming * ACCESSOR_ROOM;
-    (void)ctx, (void)frames;
-    if (glb->frames == 0)
-        return DRAPE_OK;
-    glb->status = DRAPE_OK;
-    restore(glb, at->views, at->views + TIMES_ROOM);
-    restore(glb, at->times, at->times + glb->times_room);
-    restore(glb, at->animation, at->animation + glb->animation_room);
-    restore(glb, at->accessors + glb->frames * frame, at->accessors + glb->room * frame);
-    for (uint32_t i = 0; i < glb->deforming; i++) {
-        const object *o = &glb->object[i];
-        for (uint32_t p = 0; p < o->primitives; p++)
-            restore_list(glb, glb->primitive[o->first_primitive + p].targets, TARGET_WIDTH);
-        restore_list(glb, o->weights, WEIGHT_WIDTH);
-    }
-    if (!glb->status)
-        write_lengths(glb, glb->frames * glb->frame_bytes);
-    return glb->status;
-}
-
-static drape_file *glb_file(void *state, size_t number)
-{
-    return number == 0 ? &((glb_state *)state)->file : NULL;
-}
-
 const drape_exporter_ops drape_exporter_glb = {
     .entry = {.name = "glb",
               .summary =
@@ -940,12 +868,10 @@ const drape_exporter_ops drape_exporter_glb = {
     .state_size = sizeof(glb_state),
     .y_up = true,
     .wants_bodies = true,
+    .names = {FILE_NAME},
     .check = glb_check,
     .open = glb_open,
-    .names = glb_names,
     .write = glb_write,
-    .file = glb_file,
     .archive = glb_archive,
-    .cut = glb_cut,
     .close = glb_close,
 };

@@ -10,10 +10,6 @@
 #include "io/npy.h"
 #include "model/model.h"
 
-#include <inttypes.h>
-#include <stdio.h>
-#include <string.h>
-
 #define FILE_NAME   "positions.npy"
 #define RENDER_NAME "render_positions.npy"
 
@@ -26,15 +22,9 @@ typedef struct npy_array {
 typedef struct npy_state {
     npy_array array[2]; /* (arrays) of the nodes, of the vertices of the surface */
     size_t arrays;
-    int64_t frames; /* complete frames in the files */
 } npy_state;
 
-static bool npy_names(const char *name)
-{
-    return strcmp(name, FILE_NAME) == 0 || strcmp(name, RENDER_NAME) == 0;
-}
-
-static drape_status npy_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status npy_open(const drape_export_def *def, void *state)
 {
     npy_state *npy = state;
     const drape_render_surface *surface = &def->model->surface;
@@ -45,37 +35,39 @@ static drape_status npy_open(drape_context *ctx, const drape_export_def *def, vo
     for (size_t i = 0; i < npy->arrays && !status; i++) {
         npy_array *a = &npy->array[i];
         char header[DRAPE_NPY_HEADER];
-        status = drape_export_open(ctx, def, a->name, &a->file);
+        status = drape_export_open(def, a->name, &a->file);
         if (status || def->resumes)
             continue;
         drape_npy_put_header(0, a->count, header);
         drape_file_put(&a->file, header, sizeof header);
+        drape_file_declare(&a->file, 0, sizeof header);
         status = drape_file_publish(&a->file);
     }
     return status;
 }
 
 /* Ends a frame, whose points were put. */
-static drape_status end_frame(npy_array *a, int64_t frames)
+static drape_status end_frame(npy_array *a)
 {
     char header[DRAPE_NPY_HEADER];
-    drape_npy_put_header(frames, a->count, header);
-    return drape_export_count(&a->file, 0, header, sizeof header);
+    const int64_t frame_size = 3 * (int64_t)sizeof(double) * a->count;
+    drape_npy_put_header((drape_file_end(&a->file) - DRAPE_NPY_HEADER) / frame_size, a->count, header);
+    drape_file_overwrite(&a->file, 0, header, sizeof header);
+    return drape_file_keep(&a->file);
 }
 
 /* The nodes come last, as their number of frames is what readers of the run go by: if they fail, the other
  * array has a frame more, which the next run or resume removes. */
-static drape_status npy_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status npy_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     npy_state *npy = state;
-    (void)ctx;
+    (void)def;
     drape_status status = DRAPE_OK;
     for (size_t i = npy->arrays; i-- > 0 && !status;) {
         npy_array *a = &npy->array[i];
         drape_file_put_doubles(&a->file, i ? frame->positions : frame->nodes, 3 * (size_t)a->count);
-        status = end_frame(a, npy->frames + 1);
+        status = end_frame(a);
     }
-    npy->frames += !status;
     return status;
 }
 
@@ -86,32 +78,9 @@ static drape_file *npy_shared(void *state)
 
 static drape_status npy_settle(void *state, int error, uint64_t sum)
 {
-    npy_state *npy = state;
-    npy_array *a = &npy->array[0];
+    npy_array *a = &((npy_state *)state)->array[0];
     drape_file_put_written(&a->file, 3 * sizeof(double) * (uint64_t)a->count, sum, error);
-    drape_status status = end_frame(a, npy->frames + 1);
-    npy->frames += !status;
-    return status;
-}
-
-static drape_file *npy_file(void *state, size_t number)
-{
-    npy_state *npy = state;
-    return number < npy->arrays ? &npy->array[number].file : NULL;
-}
-
-static drape_status npy_cut(drape_context *ctx, void *state, int64_t frames)
-{
-    npy_state *npy = state;
-    drape_status status = DRAPE_OK;
-    (void)ctx;
-    npy->frames = frames;
-    for (size_t i = 0; i < npy->arrays && !status; i++) {
-        char header[DRAPE_NPY_HEADER];
-        drape_npy_put_header(frames, npy->array[i].count, header);
-        status = drape_file_overwrite(&npy->array[i].file, 0, header, sizeof header);
-    }
-    return status;
+    return end_frame(a);
 }
 
 const drape_exporter_ops drape_exporter_npy = {
@@ -122,11 +91,9 @@ const drape_exporter_ops drape_exporter_npy = {
               .reference = "NPY format version 1.0, numpy.lib.format"},
     .state_size = sizeof(npy_state),
     .y_up = true,
+    .names = {FILE_NAME, RENDER_NAME},
     .open = npy_open,
-    .names = npy_names,
     .write = npy_write,
     .shared = npy_shared,
     .settle = npy_settle,
-    .file = npy_file,
-    .cut = npy_cut,
 };

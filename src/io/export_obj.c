@@ -9,13 +9,12 @@
 #include "io/export.h"
 #include "model/model.h"
 
-static drape_status obj_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status obj_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
-    const drape_export_def *def = ((drape_frames *)state)->def;
     const drape_render_surface *surface = &def->model->surface;
     drape_obj obj = {.file = def->whole};
-    (void)ctx;
-    drape_status status = drape_frames_begin(def, frame, "obj");
+    (void)state;
+    drape_status status = drape_export_begin_frame(def, frame, "obj");
     if (status)
         return status;
     drape_file_print(obj.file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
@@ -37,8 +36,6 @@ const drape_exporter_ops drape_exporter_obj = {
              "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, with its "
              "polygons, texture coordinates and materials, 17 digits",
          .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
-    .state_size = sizeof(drape_frames),
-    .ending = "obj",
-    .open = drape_frames_open,
+    .names = {"frame_" DRAPE_FRAME_DIGITS ".obj"},
     .write = obj_write,
 };

@@ -8,13 +8,12 @@
 #include "io/export.h"
 #include "model/model.h"
 
-static drape_status ply_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status ply_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
-    const drape_export_def *def = ((drape_frames *)state)->def;
     const drape_render_surface *surface = &def->model->surface;
     const int32_t *node = surface->triangle;
-    (void)ctx;
-    drape_status status = drape_frames_begin(def, frame, "ply");
+    (void)state;
+    drape_status status = drape_export_begin_frame(def, frame, "ply");
     if (status)
         return status;
     drape_file_print(def->whole,
@@ -39,8 +38,6 @@ const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
               .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
-    .state_size = sizeof(drape_frames),
-    .ending = "ply",
-    .open = drape_frames_open,
+    .names = {"frame_" DRAPE_FRAME_DIGITS ".ply"},
     .write = ply_write,
 };

@@ -40,6 +40,11 @@
 #define EXTENT      "[(%15.8e, %15.8e, %15.8e), (%15.8e, %15.8e, %15.8e)]"
 #define EXTENT_ROOM 128
 #define CODE        "%-20.12g"
+#define CODE_ROOM   32
+
+/* What records overwrite (drape_file_change), in the order in which it is declared: the last time code, the
+ * tail, and the extent of what deforms. */
+enum { END, TAIL, BOUNDS };
 
 /* The tail of the object in positions.usda closes the samples, its mesh and /run; others have no /run. */
 static const char tails[2][16] = {"}\n}\n}\n", "}\n}\n"};
@@ -52,7 +57,6 @@ typedef struct object {
     drape_file file;        /* of what changes */
     int32_t number;         /* of that file; 0: positions.usda */
     double low[3], high[3]; /* [m] of all frames so far, if its points change */
-    int64_t extent, end;    /* where extent and last time code are in the file; 0: it has none */
 } object;
 
 typedef struct material {
@@ -159,17 +163,6 @@ static drape_status usd_check(drape_context *ctx, const char *pointer, const dra
         (int)changes, MAX_CHANGES);
 }
 
-static bool usd_names(const char *name)
-{
-    static const char word[] = "positions_";
-    if (strcmp(name, FILE_NAME) == 0)
-        return true;
-    if (strncmp(name, word, sizeof word - 1) != 0)
-        return false;
-    const size_t digits = strspn(name + sizeof word - 1, "0123456789");
-    return digits > 0 && strcmp(name + sizeof word - 1 + digits, ".usda") == 0;
-}
-
 static drape_status list_objects(usd_state *usd)
 {
     const drape_render_surface *surface = &usd->def->model->surface;
@@ -202,17 +195,7 @@ static drape_status list_objects(usd_state *usd)
     return DRAPE_OK;
 }
 
-/* The file of the object that changes with this number; NULL: there are no more. */
-static drape_file *usd_file(void *state, size_t number)
-{
-    usd_state *usd = state;
-    for (int32_t i = 0; i < usd->objects; i++)
-        if (usd->object[i].number == (int32_t)number)
-            return &usd->object[i].file;
-    return NULL;
-}
-
-static drape_status usd_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status usd_open(const drape_export_def *def, void *state)
 {
     usd_state *usd = state;
     usd->def = def;
@@ -222,7 +205,7 @@ static drape_status usd_open(drape_context *ctx, const drape_export_def *def, vo
         object *o = &usd->object[i];
         snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
         if (o->changes)
-            status = drape_export_open(ctx, def, name, &o->file);
+            status = drape_export_open(def, name, &o->file);
     }
     return status;
 }
@@ -350,12 +333,6 @@ static const char order[] = "uniform token[] xformOpOrder = [\"xformOp:transform
 
 /* ---- What changes ---- */
 
-/* Where the next byte of a file will be. */
-static int64_t place(const drape_file *file)
-{
-    return (int64_t)file->size + (int64_t)file->used;
-}
-
 static void include(object *o, const double *x)
 {
     for (int k = 0; k < 3; k++) {
@@ -389,26 +366,36 @@ static void put_sample(usd_state *usd, object *o, const drape_frame *frame, doub
     drape_file_put_text(file, ",\n");
 }
 
+static void format_extent(const object *o, char text[EXTENT_ROOM])
+{
+    snprintf(text, EXTENT_ROOM, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1], o->high[2]);
+}
+
 /* Where the samples begin; before it the extent of what deforms. */
 static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
 {
+    const char *tail = tails[o->number > 0];
+    drape_file_declare(&o->file, -(int64_t)strlen(tail), strlen(tail));
     if (deforms(usd, o)) {
+        char extent[EXTENT_ROOM];
         for (int32_t i = 0; i < point_count(usd, o); i++)
             include(o, point_at(usd, o, frame, i));
+        format_extent(o, extent);
         drape_file_put_text(&o->file, "float3[] extent = ");
-        o->extent = place(&o->file);
-        drape_file_print(&o->file, EXTENT "\npoint3f[] points.timeSamples = {\n", o->low[0], o->low[1],
-                         o->low[2], o->high[0], o->high[1], o->high[2]);
+        drape_file_declare(&o->file, drape_file_end(&o->file), strlen(extent));
+        drape_file_put_text(&o->file, extent);
+        drape_file_put_text(&o->file, "\npoint3f[] points.timeSamples = {\n");
     } else {
         drape_file_put_text(&o->file, order);
         drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
     }
     put_sample(usd, o, frame, usd->code);
-    drape_file_put_text(&o->file, tails[o->number > 0]);
+    drape_file_put_text(&o->file, tail);
 }
 
 static void put_metadata(usd_state *usd, object *o, const char *prim)
 {
+    char code[CODE_ROOM];
     drape_file *file = &o->file;
     drape_file_print(file,
                      "#usda 1.0\n(\ndefaultPrim = \"%s\"\ndoc = \"Drape %s\"\nframesPerSecond = %.17g\n"
@@ -416,8 +403,10 @@ static void put_metadata(usd_state *usd, object *o, const char *prim)
                      "endTimeCode = ",
                      prim, drape_version(), usd->def->frame_rate, usd->def->frame_rate,
                      usd->def->model->z_up ? "Z" : "Y");
-    o->end = place(file);
-    drape_file_print(file, CODE "\n)\n\n", usd->code);
+    snprintf(code, sizeof code, CODE, usd->code);
+    drape_file_declare(file, drape_file_end(file), strlen(code));
+    drape_file_put_text(file, code);
+    drape_file_put_text(file, "\n)\n\n");
 }
 
 static void begin_mesh(usd_state *usd, drape_file *file, const object *o)
@@ -475,54 +464,36 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
     put_samples(usd, first, frame);
 }
 
-/* Writes extent and last time code over those before. */
-static drape_status write_bounds(usd_state *usd, object *o)
-{
-    char text[EXTENT_ROOM];
-    drape_status status = DRAPE_OK;
-    if (o->extent > 0) {
-        snprintf(text, sizeof text, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1],
-                 o->high[2]);
-        status = drape_file_overwrite(&o->file, (off_t)o->extent, text, strlen(text));
-    }
-    snprintf(text, sizeof text, CODE, usd->code);
-    return status ? status : drape_file_overwrite(&o->file, (off_t)o->end, text, strlen(text));
-}
-
-/* Bounds first: they may be larger than what is there, but not smaller. */
+/* Bounds first: they may be larger than what is there, but not smaller. Blanks take the place of the tail
+ * before and of the sign of the comment. */
 static drape_status write_next(usd_state *usd, object *o, const drape_frame *frame)
 {
     static const char blanks[] = "                ";
+    char extent[EXTENT_ROOM], code[CODE_ROOM];
     const char *tail = tails[o->number > 0];
     const size_t length = strlen(tail);
     const off_t before = o->file.kept;
     for (int32_t i = 0; deforms(usd, o) && i < point_count(usd, o); i++)
         include(o, point_at(usd, o, frame, i));
-    drape_status status = write_bounds(usd, o);
-    if (status)
-        return status;
+    format_extent(o, extent);
+    if (deforms(usd, o))
+        drape_file_overwrite(&o->file, o->file.change[BOUNDS].offset, extent, strlen(extent));
+    snprintf(code, sizeof code, CODE, usd->code);
+    drape_file_overwrite(&o->file, o->file.change[END].offset, code, strlen(code));
     drape_file_put_text(&o->file, "#");
     put_sample(usd, o, frame, usd->code);
-    status = drape_file_keep(&o->file);
-    if (status)
-        return status;
     drape_file_put_text(&o->file, tail);
-    status = drape_file_keep(&o->file);
-    if (!status)
-        status = drape_file_overwrite(&o->file, before - (off_t)length, blanks, length + 1);
-    if (status)
-        drape_file_cut(&o->file, before);
-    return status;
+    drape_file_overwrite(&o->file, before - (off_t)length, blanks, length + 1);
+    return drape_file_keep(&o->file);
 }
 
 /* positions.usda appears last: it refers to the others. */
-static drape_status usd_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status usd_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     usd_state *usd = state;
     drape_status status = DRAPE_OK;
-    (void)ctx;
     /* frames between have whole numbers; that at the end of a run may not */
-    const double code = frame->time * usd->def->frame_rate, whole = floor(code + .5);
+    const double code = frame->time * def->frame_rate, whole = floor(code + .5);
     usd->code = fabs(code - whole) < 1e-6 ? whole : code;
     for (int32_t i = usd->objects - 1; i >= 0 && !status; i--) {
         object *o = &usd->object[i];
@@ -544,7 +515,7 @@ static drape_status usd_write(drape_context *ctx, void *state, const drape_frame
     return status;
 }
 
-/* ---- Checkpoints and end ---- */
+/* ---- Checkpoints ---- */
 
 static void usd_archive(void *state, drape_archive *a)
 {
@@ -558,27 +529,7 @@ static void usd_archive(void *state, drape_archive *a)
             continue;
         drape_archive_bytes(a, o->low, sizeof o->low);
         drape_archive_bytes(a, o->high, sizeof o->high);
-        drape_archive_int64(a, &o->extent);
-        drape_archive_int64(a, &o->end);
     }
-}
-
-/* The tail of the last frame to be kept, which a later one made blanks, closes the file again. */
-static drape_status usd_cut(drape_context *ctx, void *state, int64_t frames)
-{
-    usd_state *usd = state;
-    drape_status status = DRAPE_OK;
-    (void)ctx;
-    for (int32_t i = 0; i < usd->objects && frames > 0 && !status; i++) {
-        object *o = &usd->object[i];
-        const char *tail = tails[o->number > 0];
-        if (!o->changes)
-            continue;
-        status = write_bounds(usd, o);
-        if (!status)
-            status = drape_file_overwrite(&o->file, o->file.kept - (off_t)strlen(tail), tail, strlen(tail));
-    }
-    return status;
 }
 
 const drape_exporter_ops drape_exporter_usd = {
@@ -591,10 +542,8 @@ const drape_exporter_ops drape_exporter_usd = {
     .state_size = sizeof(usd_state),
     .wants_bodies = true,
     .check = usd_check,
+    .names = {FILE_NAME, "positions_#.usda"},
     .open = usd_open,
-    .names = usd_names,
     .write = usd_write,
-    .file = usd_file,
     .archive = usd_archive,
-    .cut = usd_cut,
 };

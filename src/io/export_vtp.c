@@ -28,17 +28,20 @@ static const char pvd_begin[] = "<?xml version=\"1.0\"?>\n"
 static const char pvd_end[] = "</Collection></VTKFile>\n";
 
 typedef struct vtp_state {
-    const drape_export_def *def;
     drape_file pvd;
     char *entries; /* (PVD_ROOM (1 + body_count)) of one frame */
 } vtp_state;
 
 /* ---- The collection ---- */
 
-/* Of a collider in a frame. */
-static void format_body_name(const vtp_state *vtp, int32_t number, int64_t frame, char name[64])
+static bool changes(const drape_export_body *body)
 {
-    if (vtp->def->bodies[number].moves || vtp->def->bodies[number].deforms)
+    return body->moves || body->deforms;
+}
+
+static void format_body_name(const drape_export_def *def, int32_t number, int64_t frame, char name[64])
+{
+    if (changes(&def->bodies[number]))
         snprintf(name, 64, BODY_FRAME_NAME, number, frame);
     else
         snprintf(name, 64, BODY_NAME, number);
@@ -51,21 +54,22 @@ static size_t put_entry(vtp_state *vtp, size_t at, double time, int32_t part, co
                                  part, name);
 }
 
-/* On a full disk the last line is restored where it was: the file already has that room. */
-static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
+/* On a full disk the last line is restored where it was: the file already has that space. */
+static drape_status pvd_add(const drape_export_def *def, vtp_state *vtp, const drape_frame *frame)
 {
     const off_t end = vtp->pvd.kept - (off_t)(sizeof pvd_end - 1);
     char name[64];
-    snprintf(name, sizeof name, DRAPE_FRAME_NAME, frame->index, "vtp");
+    snprintf(name, sizeof name, "frame_%06" PRId64 ".vtp", frame->index);
     size_t size = put_entry(vtp, 0, frame->time, 0, name);
-    for (int32_t b = 0; b < vtp->def->body_count; b++) {
-        format_body_name(vtp, b, frame->index, name);
+    for (int32_t b = 0; b < def->body_count; b++) {
+        format_body_name(def, b, frame->index, name);
         size = put_entry(vtp, size, frame->time, b + 1, name);
     }
     memcpy(vtp->entries + size, pvd_end, sizeof pvd_end);
-    drape_status status = drape_file_overwrite(&vtp->pvd, end, vtp->entries, size + sizeof pvd_end - 1);
-    if (status && !drape_file_overwrite(&vtp->pvd, end, pvd_end, sizeof pvd_end - 1))
-        drape_file_cut(&vtp->pvd, end + (off_t)sizeof pvd_end - 1);
+    drape_file_overwrite(&vtp->pvd, end, vtp->entries, size + sizeof pvd_end - 1);
+    const drape_status status = drape_file_keep(&vtp->pvd);
+    if (status)
+        drape_file_overwrite(&vtp->pvd, end, pvd_end, sizeof pvd_end - 1);
     return status;
 }
 
@@ -209,9 +213,9 @@ static void put_body_points(drape_file *file, const array *a)
 }
 
 /* Points in space, and triangles; the cells know the number of their collider. */
-static drape_status write_body(vtp_state *vtp, const drape_frame *frame, int32_t number)
+static drape_status write_body(const drape_export_def *def, const drape_frame *frame, int32_t number)
 {
-    const drape_export_body *body = &vtp->def->bodies[number];
+    const drape_export_body *body = &def->bodies[number];
     const size_t cells = (size_t)body->triangle_count;
     const body_points points = {frame, body, number};
     const array list[] = {
@@ -221,49 +225,32 @@ static drape_status write_body(vtp_state *vtp, const drape_frame *frame, int32_t
         {"Int32", "offsets", 1, cells, 4, put_offsets, NULL, 0},
     };
     char name[64];
-    format_body_name(vtp, number, frame->index, name);
-    drape_file_name(vtp->def->whole, "%s", name);
-    drape_status status = drape_file_begin(vtp->def->whole);
+    format_body_name(def, number, frame->index, name);
+    drape_file_name(def->whole, "%s", name);
+    drape_status status = drape_file_begin(def->whole);
     if (status)
         return status;
-    put_part(vtp->def->whole, frame->time, list, 1, 4, "collider");
-    return drape_file_finish(vtp->def->whole);
+    put_part(def->whole, frame->time, list, 1, 4, "collider");
+    return drape_file_finish(def->whole);
 }
 
 /* ---- The format ---- */
 
-/* The collection, collider_0.vtp and collider_0_000000.vtp. */
-static bool vtp_names(const char *name)
-{
-    static const char word[] = "collider_", digit[] = "0123456789";
-    if (strcmp(name, PVD_NAME) == 0)
-        return true;
-    if (strncmp(name, word, sizeof word - 1) != 0)
-        return false;
-    const char *number = name + sizeof word - 1, *rest = number + strspn(number, digit);
-    const size_t digits = *rest == '_' ? strspn(rest + 1, digit) : 0;
-    if (rest == number || (*rest == '_' && digits < DRAPE_FRAME_DIGITS))
-        return false;
-    return strcmp(digits > 0 ? rest + 1 + digits : rest, ".vtp") == 0;
-}
-
-static drape_status vtp_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status vtp_open(const drape_export_def *def, void *state)
 {
     vtp_state *vtp = state;
-    vtp->def = def;
     vtp->entries = drape_arena_take(def->arena, 1 + (size_t)def->body_count, PVD_ROOM);
-    drape_status status = vtp->entries ? drape_export_open(ctx, def, PVD_NAME, &vtp->pvd) : DRAPE_E_MEMORY;
+    drape_status status = vtp->entries ? drape_export_open(def, PVD_NAME, &vtp->pvd) : DRAPE_E_MEMORY;
     if (status || def->resumes)
         return status;
     drape_file_put_text(&vtp->pvd, pvd_begin);
     drape_file_put_text(&vtp->pvd, pvd_end);
+    drape_file_declare(&vtp->pvd, -(int64_t)(sizeof pvd_end - 1), sizeof pvd_end - 1);
     return drape_file_publish(&vtp->pvd);
 }
 
-static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame *frame)
+static drape_status vtp_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
-    vtp_state *vtp = state;
-    const drape_export_def *def = vtp->def;
     const drape_render_surface *surface = &def->model->surface;
     const size_t nodes = (size_t)surface->node_count, cells = (size_t)surface->triangle_count;
     const double *density = frame->energy_density;
@@ -281,31 +268,16 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
         {"Int32", "offsets", 1, cells, 4, put_offsets, NULL, 0},
     };
     drape_status status = DRAPE_OK;
-    (void)ctx;
     for (int32_t b = 0; b < def->body_count && !status; b++)
-        if (def->bodies[b].moves || def->bodies[b].deforms || frame->index == 0)
-            status = write_body(vtp, frame, b);
+        if (changes(&def->bodies[b]) || frame->index == 0)
+            status = write_body(def, frame, b);
     if (!status)
-        status = drape_frames_begin(def, frame, "vtp");
+        status = drape_export_begin_frame(def, frame, "vtp");
     if (status)
         return status;
     put_part(def->whole, frame->time, list, 4, 10, "strain_max");
     status = drape_file_finish(def->whole);
-    return status ? status : pvd_add(vtp, frame);
-}
-
-static drape_file *vtp_file(void *state, size_t number)
-{
-    return number == 0 ? &((vtp_state *)state)->pvd : NULL;
-}
-
-/* The last line takes the place of the entries to be removed: at any moment the collection is complete. */
-static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
-{
-    vtp_state *vtp = state;
-    (void)ctx, (void)frames;
-    return drape_file_overwrite(&vtp->pvd, vtp->pvd.kept - (off_t)(sizeof pvd_end - 1), pvd_end,
-                                sizeof pvd_end - 1);
+    return status ? status : pvd_add(def, state, frame);
 }
 
 const drape_exporter_ops drape_exporter_vtp = {
@@ -316,10 +288,8 @@ const drape_exporter_ops drape_exporter_vtp = {
     .state_size = sizeof(vtp_state),
     .wants_fields = true,
     .wants_bodies = true,
-    .ending = "vtp",
+    .names = {"frame_" DRAPE_FRAME_DIGITS ".vtp", PVD_NAME, "collider_#.vtp",
+              "collider_#_" DRAPE_FRAME_DIGITS ".vtp"},
     .open = vtp_open,
-    .names = vtp_names,
     .write = vtp_write,
-    .file = vtp_file,
-    .cut = vtp_cut,
 };

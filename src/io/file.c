@@ -1,6 +1,7 @@
 /* file.c: see file.h. */
 #include "io/file.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -13,7 +14,7 @@
 #define BUFFER_SIZE 65536
 #define MAX_PRINT   1024
 #define MAX_NAME    256
-#define PATCHED     4096 /* bytes that are overwritten at once */
+#define READ_SIZE   16384 /* bytes that are read at once for a checksum */
 
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error)
 {
@@ -97,30 +98,14 @@ drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, 
     return fd < 0 ? DRAPE_E_FILE : drape_file_take(ctx, fd, path, limit, bytes, size);
 }
 
-/* Bytes of a file that is resumed which will be overwritten. */
-struct drape_patch {
-    drape_patch *next;
-    off_t offset;
-    size_t size;
-    unsigned char bytes[];
-};
-
-static void free_patches(drape_file *file)
-{
-    for (drape_patch *p; (p = file->patches);) {
-        file->patches = p->next;
-        drape_free(file->ctx, p);
-    }
-}
-
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
 {
-    *file = (drape_file){.ctx = ctx, .room = path_length + DRAPE_PART_SIZE};
-    file->path = drape_alloc(ctx, 2 * file->room + BUFFER_SIZE, 1);
+    *file = (drape_file){.ctx = ctx, .capacity = path_length + DRAPE_PART_SIZE};
+    file->path = drape_alloc(ctx, 2 * file->capacity + BUFFER_SIZE, 1);
     if (!file->path)
         return DRAPE_E_MEMORY;
-    file->part = file->path + file->room;
-    file->buffer = file->part + file->room;
+    file->part = file->path + file->capacity;
+    file->buffer = file->part + file->capacity;
     return DRAPE_OK;
 }
 
@@ -165,7 +150,6 @@ void drape_file_destroy(drape_file *file)
     drape_file_abandon(file);
     if (file->path)
         drape_free(file->ctx, file->path);
-    free_patches(file);
     *file = (drape_file){.fd = -1};
 }
 
@@ -173,7 +157,7 @@ void drape_file_name(drape_file *file, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    vsnprintf(file->path, file->room, format, args);
+    vsnprintf(file->path, file->capacity, format, args);
     va_end(args);
 }
 
@@ -216,7 +200,7 @@ drape_status drape_file_begin(drape_file *file)
         if (file->folder)
             drape_folder_part(file->folder, number, file->part);
         else
-            snprintf(file->part, file->room, "%.*s.drape-%016" PRIx64 DRAPE_FILE_PART,
+            snprintf(file->part, file->capacity, "%.*s.drape-%016" PRIx64 DRAPE_FILE_PART,
                      slash ? (int)(slash + 1 - file->path) : 0, file->path, number);
         file->fd = openat(base_of(file), file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
                           (mode_t)0666);
@@ -230,7 +214,8 @@ drape_status drape_file_begin(drape_file *file)
     file->used = 0;
     file->error = 0;
     file->size = file->kept = 0;
-    file->sum = file->kept_sum = (drape_checksum){0};
+    file->sum = (drape_checksum){0};
+    memset(file->change, 0, sizeof file->change);
     return DRAPE_OK;
 }
 
@@ -241,7 +226,10 @@ static void flush(drape_file *file)
 {
     size_t done = 0;
     while (done < file->used && !file->error) {
-        ssize_t n = write(file->fd, file->buffer + done, file->used - done);
+        const char *from = file->buffer + done;
+        ssize_t n = pwrite(file->fd, from, file->used - done, file->size + (off_t)done);
+        if (n < 0 && errno == ESPIPE)
+            n = write(file->fd, from, file->used - done);
         if (n > 0)
             done += (size_t)n;
         else if (n == 0)
@@ -258,7 +246,7 @@ void drape_file_put(drape_file *file, const void *data, size_t size)
 {
     const char *from = data;
     while (size > 0) {
-        size_t room = BUFFER_SIZE - file->used, part = size < room ? size : room;
+        const size_t left = BUFFER_SIZE - file->used, part = size < left ? size : left;
         memcpy(file->buffer + file->used, from, part);
         file->used += part;
         from += part;
@@ -271,18 +259,13 @@ void drape_file_put(drape_file *file, const void *data, size_t size)
 void drape_file_put_written(drape_file *file, uint64_t size, uint64_t sum, int error)
 {
     flush(file);
-    const off_t end = file->size + (off_t)size;
     if (!file->error)
         file->error = error;
     if (file->error)
         return;
-    if (lseek(file->fd, end, SEEK_SET) != end) {
-        file->error = errno;
-        return;
-    }
     file->sum.sum += sum;
     file->sum.size += size;
-    file->size = end;
+    file->size += (off_t)size;
 }
 
 bool drape_file_reach(const drape_file *file, char *path, size_t size)
@@ -292,11 +275,16 @@ bool drape_file_reach(const drape_file *file, char *path, size_t size)
     return length > 0 && (size_t)length < size;
 }
 
+static void split_word(uint32_t word, unsigned char bytes[4])
+{
+    for (int b = 0; b < 4; b++)
+        bytes[b] = (unsigned char)(word >> 8 * b);
+}
+
 void drape_file_put_word(drape_file *file, uint32_t word)
 {
     unsigned char bytes[4];
-    for (int b = 0; b < 4; b++)
-        bytes[b] = (unsigned char)(word >> 8 * b);
+    split_word(word, bytes);
     drape_file_put(file, bytes, sizeof bytes);
 }
 
@@ -336,6 +324,98 @@ void drape_file_print(drape_file *file, const char *format, ...)
     drape_file_put_text(file, text);
 }
 
+/* ---- Overwriting ---- */
+
+int64_t drape_file_end(const drape_file *file)
+{
+    return (int64_t)file->size + (int64_t)file->used;
+}
+
+/* Where declared bytes are in a file of this size. */
+static off_t place_of(const drape_file_change *c, off_t size)
+{
+    return (off_t)c->offset + (c->offset < 0 ? size : 0);
+}
+
+/* The checksum of the bytes from `begin`, a multiple of 8, to `end`, of which those in `change`
+ * (DRAPE_FILE_CHANGES; NULL: none) are taken from there. 0 or errno. */
+static int sum_bytes(int fd, off_t begin, off_t end, const drape_file_change *change, drape_checksum *sum)
+{
+    unsigned char bytes[READ_SIZE];
+    *sum = (drape_checksum){.size = (uint64_t)begin};
+    for (off_t next; begin < end; begin = next) {
+        next = end - begin < READ_SIZE ? end : begin + READ_SIZE;
+        const int error = drape_read_at(fd, bytes, (size_t)(next - begin), begin);
+        if (error)
+            return error;
+        for (const drape_file_change *c = change; c && c < change + DRAPE_FILE_CHANGES; c++) {
+            const off_t at = place_of(c, end), first = at > begin ? at : begin,
+                        last = at + c->size < next ? at + (off_t)c->size : next;
+            if (first < last)
+                memcpy(bytes + (first - begin), c->bytes + (first - at), (size_t)(last - first));
+        }
+        drape_checksum_add(sum, bytes, (size_t)(next - begin));
+    }
+    return 0;
+}
+
+int drape_file_sum(int fd, off_t size, drape_checksum *sum)
+{
+    return sum_bytes(fd, 0, size, NULL, sum);
+}
+
+static int write_at(int fd, off_t offset, const void *data, size_t size)
+{
+    for (const char *from = data; size > 0;) {
+        const ssize_t n = pwrite(fd, from, size, offset);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return n < 0 ? errno : ENOSPC;
+        from += n;
+        offset += n;
+        size -= (size_t)n;
+    }
+    return 0;
+}
+
+/* The checksum changes by that of the words that the bytes touch. */
+void drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
+{
+    const off_t begin = offset / 8 * 8, end = offset + (off_t)size, last = (end + 7) / 8 * 8;
+    drape_checksum before, after;
+    flush(file);
+    if (!file->error)
+        file->error = sum_bytes(file->fd, begin, last < file->size ? last : file->size, NULL, &before);
+    if (!file->error)
+        file->error = write_at(file->fd, offset, data, size);
+    if (file->error)
+        return;
+    file->size = end > file->size ? end : file->size;
+    file->error = sum_bytes(file->fd, begin, last < file->size ? last : file->size, NULL, &after);
+    file->sum.sum += after.sum - before.sum;
+    if (last >= file->size) {
+        file->sum.size = after.size;
+        memcpy(file->sum.tail, after.tail, sizeof after.tail);
+    }
+}
+
+void drape_file_overwrite_word(drape_file *file, off_t offset, uint32_t word)
+{
+    unsigned char bytes[4];
+    split_word(word, bytes);
+    drape_file_overwrite(file, offset, bytes, sizeof bytes);
+}
+
+void drape_file_declare(drape_file *file, int64_t offset, size_t size)
+{
+    drape_file_change *c = file->change;
+    while (c->size > 0)
+        c++;
+    assert(c < file->change + DRAPE_FILE_CHANGES);
+    *c = (drape_file_change){.offset = offset, .size = (int64_t)size};
+}
+
 /* ---- Ending ---- */
 
 /* Records the file in its manifest, then gives it its name. */
@@ -367,7 +447,6 @@ drape_status drape_file_publish(drape_file *file)
     else if (fstat(file->fd, &file->last))
         file->last = (struct stat){0};
     file->kept = file->size;
-    file->kept_sum = file->sum;
     return status;
 }
 
@@ -398,129 +477,21 @@ drape_status drape_file_finish(drape_file *file)
     return status;
 }
 
-int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksum *sum)
-{
-    unsigned char bytes[16384];
-    int error = 0;
-    *sum = (drape_checksum){0};
-    while (!error && sum->size < (uint64_t)size) {
-        const uint64_t left = (uint64_t)size - sum->size;
-        const size_t n = left < sizeof bytes ? (size_t)left : sizeof bytes;
-        const off_t offset = (off_t)sum->size;
-        error = drape_read_at(fd, bytes, n, offset);
-        for (const drape_patch *p = patches; p; p = p->next) {
-            const off_t last = p->offset + (off_t)p->size, read = offset + (off_t)n;
-            const off_t begin = p->offset > offset ? p->offset : offset, end = last < read ? last : read;
-            if (begin < end)
-                memcpy(bytes + (begin - offset), p->bytes + (begin - p->offset), (size_t)(end - begin));
-        }
-        if (!error)
-            drape_checksum_add(sum, bytes, n);
-    }
-    return error;
-}
-
-/* The checksum of the first bytes of the file, as they are; 0 or errno. */
-static int sum_up(drape_file *file, off_t size)
-{
-    const int error = drape_file_sum(file->fd, size, NULL, &file->sum);
-    file->kept_sum = file->sum;
-    return error;
-}
-
-/* A file that cannot be cut, such as a pipe, stays as it is; the failure that led here is the one to
- * report. */
-void drape_file_cut(drape_file *file, off_t size)
-{
-    if (ftruncate(file->fd, size) || lseek(file->fd, size, SEEK_SET) != size)
-        return;
-    file->size = file->kept = size;
-    sum_up(file, size);
-}
-
+/* A file that cannot be cut, such as a pipe, stays as it is. */
 drape_status drape_file_keep(drape_file *file)
 {
     flush(file);
-    int error = file->error;
+    const int error = file->error;
     file->error = 0;
     if (!error) {
         file->kept = file->size;
-        file->kept_sum = file->sum;
         return DRAPE_OK;
     }
-    drape_file_cut(file, file->kept);
+    if (ftruncate(file->fd, file->kept) == 0) {
+        file->size = file->kept;
+        drape_file_sum(file->fd, file->size, &file->sum);
+    }
     return fail(file, "write", error);
-}
-
-/* Accounts for at most PATCHED bytes that are about to be overwritten; 0 or errno. */
-static int account(drape_file *file, off_t offset, const void *data, size_t size)
-{
-    unsigned char words[PATCHED + 16] = {0};
-    const off_t begin = offset / 8 * 8, end = offset + (off_t)size;
-    const off_t last = (end + 7) / 8 * 8, was = file->size < last ? file->size : last;
-    const int error = was > begin ? drape_read_at(file->fd, words, (size_t)(was - begin), begin) : 0;
-    drape_checksum *sum = &file->sum;
-    if (error)
-        return error;
-    if (was > begin)
-        sum->sum -= drape_checksum_bytes((uint64_t)begin, words, (size_t)(was - begin));
-    memcpy(words + (offset - begin), data, size);
-    const off_t becomes = was > end ? was : end;
-    sum->sum += drape_checksum_bytes((uint64_t)begin, words, (size_t)(becomes - begin));
-    if (becomes >= file->size) {
-        sum->size = (uint64_t)becomes;
-        memcpy(sum->tail, words + (becomes / 8 * 8 - begin), (size_t)(becomes % 8));
-    }
-    return 0;
-}
-
-static int write_at(int fd, off_t offset, const void *data, size_t size)
-{
-    for (const char *from = data; size > 0;) {
-        const ssize_t n = pwrite(fd, from, size, offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return n < 0 ? errno : ENOSPC;
-        from += n;
-        offset += n;
-        size -= (size_t)n;
-    }
-    return 0;
-}
-
-drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
-{
-    int error = 0;
-    if (file->resumed) {
-        drape_patch **last = &file->patches;
-        if (offset + (off_t)size > file->size)
-            return fail(file, "continue", EINVAL);
-        while (*last)
-            last = &(*last)->next;
-        *last = drape_alloc(file->ctx, 1, sizeof **last + size);
-        if (!*last)
-            return DRAPE_E_MEMORY;
-        **last = (drape_patch){.offset = offset, .size = size};
-        memcpy((*last)->bytes, data, size);
-        return DRAPE_OK;
-    }
-    for (const char *from = data; size > 0 && !error;) {
-        const size_t part = size < PATCHED ? size : PATCHED;
-        error = account(file, offset, from, part);
-        if (error)
-            break;
-        error = write_at(file->fd, offset, from, part);
-        from += part;
-        offset += (off_t)part;
-        size -= part;
-        if (error)
-            sum_up(file, file->kept);
-        else if (offset > file->size)
-            file->size = file->kept = offset;
-    }
-    file->kept_sum = file->sum;
-    return error ? fail(file, "write", error) : DRAPE_OK;
 }
 
 drape_status drape_file_sync(drape_file *file)
@@ -561,54 +532,70 @@ bool drape_folder_has(const char *folder, const char *path)
     return known && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
-/* ---- Continuing ---- */
+/* ---- Resuming ---- */
+
+void drape_file_archive(drape_file *file, drape_archive *a)
+{
+    int64_t kept = file->kept, sum = (int64_t)file->sum.sum;
+    drape_archive_int64(a, &kept);
+    drape_archive_int64(a, &sum);
+    for (drape_file_change *c = file->change; c < file->change + DRAPE_FILE_CHANGES; c++) {
+        drape_archive_int64(a, &c->offset);
+        drape_archive_int64(a, &c->size);
+        if (drape_archive_has_read(a)) {
+            if (c->size < 0 || c->size > kept || c->offset < -kept || place_of(c, kept) > kept - c->size)
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint overwrites bytes beyond a file");
+            c->bytes = drape_archive_next(a, (size_t)c->size);
+        }
+        for (int64_t done = 0; !a->reading && done < c->size && !a->status;) {
+            unsigned char bytes[READ_SIZE];
+            const size_t n = c->size - done < READ_SIZE ? (size_t)(c->size - done) : READ_SIZE;
+            const int error = drape_read_at(file->fd, bytes, n, place_of(c, kept) + (off_t)done);
+            if (error)
+                drape_archive_note(a, fail(file, "read", error));
+            drape_archive_bytes(a, bytes, n);
+            done += (int64_t)n;
+        }
+    }
+    if (drape_archive_has_read(a)) {
+        file->kept = file->size = (off_t)kept;
+        file->sum.sum = (uint64_t)sum;
+    }
+}
 
 drape_status drape_file_reopen(drape_file *file)
 {
+    const char *folder = drape_folder_path(file->folder);
+    const uint64_t expected = file->sum.sum;
     *file->part = 0;
-    file->fd = drape_open_regular(base_of(file), file->path, O_RDWR | O_NOFOLLOW);
-    if (file->fd < 0)
-        return fail(file, "continue", errno);
-    file->open = file->resumed = true;
-    file->used = 0;
-    file->error = 0;
-    file->size = file->kept;
-    if (fstat(file->fd, &file->last))
+    file->fd = drape_open_regular(drape_folder_descriptor(file->folder), file->path, O_RDWR | O_NOFOLLOW);
+    file->open = file->fd >= 0;
+    if (!file->open || fstat(file->fd, &file->last))
         return fail(file, "continue", errno);
     if (file->last.st_size < file->kept)
         return drape_fail(
             file->ctx, DRAPE_E_FILE,
-            "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint",
-            drape_folder_path(file->folder), file->path, (long long)file->last.st_size,
-            (long long)file->kept);
-    return lseek(file->fd, file->kept, SEEK_SET) < 0 ? fail(file, "continue", errno) : DRAPE_OK;
-}
-
-drape_status drape_file_compare(drape_file *file)
-{
-    const int error = drape_file_sum(file->fd, file->kept, file->patches, &file->sum);
-    file->kept_sum = file->sum;
+            "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint", folder,
+            file->path, (long long)file->last.st_size, (long long)file->kept);
+    const int error = sum_bytes(file->fd, 0, file->kept, file->change, &file->sum);
     if (error)
         return fail(file, "continue", error);
-    return file->sum.sum == file->expected
+    return file->sum.sum == expected
                ? DRAPE_OK
-               : drape_fail(
-                     file->ctx, DRAPE_E_PARSE,
-                     "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of the "
-                     "checkpoint",
-                     drape_folder_path(file->folder), file->path);
+               : drape_fail(file->ctx, DRAPE_E_PARSE,
+                            "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of "
+                            "the checkpoint",
+                            folder, file->path);
 }
 
 drape_status drape_file_trim(drape_file *file)
 {
-    int error = 0;
     drape_status status = drape_folder_note(file->folder, file->path, NULL, file->fd, file->durable);
-    for (const drape_patch *p = file->patches; p && !status && !error; p = p->next)
-        error = write_at(file->fd, p->offset, p->bytes, p->size);
+    int error = 0;
+    for (drape_file_change *c = file->change; c < file->change + DRAPE_FILE_CHANGES && !status && !error; c++)
+        error = write_at(file->fd, place_of(c, file->kept), c->bytes, (size_t)c->size);
     if (!status && !error && ftruncate(file->fd, file->kept))
         error = errno;
-    free_patches(file);
-    file->resumed = false;
     return error ? fail(file, "continue", error) : status;
 }
 
@@ -616,13 +603,12 @@ drape_status drape_file_close(drape_file *file)
 {
     if (!file->open)
         return DRAPE_OK;
-    const bool published = !*file->part && file->folder && !file->resumed;
+    const bool published = !*file->part && file->folder;
     int error = close_descriptor(file);
     drop(file);
     if (error)
         return fail(file, "close", error);
-    return published ? drape_folder_note(file->folder, file->path, &file->kept_sum, -1, file->durable)
-                     : DRAPE_OK;
+    return published ? drape_folder_note(file->folder, file->path, &file->sum, -1, file->durable) : DRAPE_OK;
 }
 
 /* ---- Folders ---- */

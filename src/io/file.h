@@ -1,46 +1,55 @@
 /*
  * file.h: one output file at a time, written such that nobody sees an incomplete one.
  *
- * A file belongs to a folder (folder.h), whose rule says what it may replace, or it was named by the user,
- * who means to replace a regular file of that name. It is begun under a temporary name beside its own,
- * filled through a buffer, and then renamed to its own name. Some files then grow by records: a record that
- * does not fit on the disk is cut off again. A killed process leaves complete files and complete records. A
- * durable file also survives a power failure, with its content at the time when drape_file_sync or
- * drape_file_finish returned and the folder was synced. It uses write(2) instead of stdio, so that no file
- * needs the heap, and errno belongs to the call that failed.
+ * A file belongs to a folder (folder.h), whose rule says what it may replace, or the user named it, who means
+ * to replace a regular file of that name. It is begun under a temporary name, filled through a buffer, and
+ * renamed. It is complete then (drape_file_finish), or it is published and grows by records: bytes that are
+ * put at its end and bytes in its middle that are overwritten, until drape_file_keep ends the record. A
+ * record that fails, as on a full disk, is cut off again. A killed process leaves complete files and complete
+ * records. A durable file also survives a power failure, with its content at the time when drape_file_sync or
+ * drape_file_finish returned and the folder was synced.
+ *
+ * write(2) is used instead of stdio, so that no file needs the heap, and errno belongs to the call that
+ * failed.
  */
 #ifndef DRAPE_IO_FILE_H
 #define DRAPE_IO_FILE_H
 
 #include <sys/stat.h>
 
+#include "base/archive.h"
 #include "base/checksum.h"
 #include "base/context.h"
 #include "io/folder.h"
 
-#define DRAPE_FILE_PART ".part"          /* suffix of temporary names */
-#define DRAPE_MAX_TABLE ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
+#define DRAPE_FILE_PART    ".part"          /* suffix of temporary names */
+#define DRAPE_MAX_TABLE    ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
+#define DRAPE_FILE_CHANGES 3
 
-typedef struct drape_patch drape_patch;
+/* Bytes of a growing file that later records overwrite. */
+typedef struct drape_file_change {
+    int64_t offset;             /* < 0: counted from the end of the last complete record */
+    int64_t size;               /* 0: unused */
+    const unsigned char *bytes; /* while a run is resumed: what a checkpoint says they were */
+} drape_file_change;
 
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
     drape_context *ctx;
     drape_folder *folder; /* NULL: the user named the file */
     char *path, *part;    /* its own name; its temporary one until it is published, "" if it has none */
-    size_t room;          /* for each of these names */
+    size_t capacity;      /* of each of these names */
     char *buffer;
     size_t used; /* bytes in the buffer */
     int fd;
     bool open;
-    bool durable;                 /* finishing it waits until it is on the disk */
-    int error;                    /* errno of the first failed write since the last record; 0: none */
-    off_t size, kept;             /* bytes written; bytes of complete records */
-    drape_checksum sum, kept_sum; /* of these bytes */
-    bool resumed;                 /* it was reopened, and not trimmed yet */
-    uint64_t expected;            /* checksum that the file must have when it is continued */
-    drape_patch *patches;         /* what will be overwritten then */
-    struct stat last;             /* the file that was last published; st_ino 0: none */
+    bool durable;       /* finishing it waits until it is on the disk */
+    int error;          /* errno of the first failure since the last record; 0: none */
+    off_t size, kept;   /* bytes written; bytes of complete records */
+    drape_checksum sum; /* of the bytes written */
+    drape_file_change change[DRAPE_FILE_CHANGES];
+    struct stat last;        /* the file that was last published; st_ino 0: none */
+    struct drape_file *next; /* growing file of the same run; NULL: there are no more */
 } drape_file;
 
 /* Takes all memory for files that the user names, with paths of at most path_length bytes; or for the file of
@@ -72,11 +81,22 @@ void drape_file_put_text(drape_file *file, const char *text);
 void drape_file_put_word(drape_file *file, uint32_t word); /* little endian, like the next two */
 void drape_file_put_float(drape_file *file, float value);
 void drape_file_put_doubles(drape_file *file, const double *values, size_t count);
-/* What other processes wrote there, where what was put before ends at a multiple of 8; sum: what it adds to
- * the checksum; error: the errno with which they failed, 0: none. */
+/* Accounts for bytes that other processes wrote at the end, which was at a multiple of 8; sum: what they add
+ * to the checksum; error: the errno with which they failed, 0: none. */
 void drape_file_put_written(drape_file *file, uint64_t size, uint64_t sum, int error);
 /* Text below 1 KiB, in the locale of the thread. */
 void drape_file_print(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 3);
+
+/* Where the next byte will be. */
+int64_t drape_file_end(const drape_file *file);
+
+/* Overwrites bytes, after all that was put has been written; they may reach beyond the end. A failure is
+ * reported as one of putting. */
+void drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
+void drape_file_overwrite_word(drape_file *file, off_t offset, uint32_t word); /* little endian */
+
+/* Declares bytes that records overwrite, so that a checkpoint has them; an offset < 0 counts from the end. */
+void drape_file_declare(drape_file *file, int64_t offset, size_t size);
 
 /* Closes the file and gives it its name. After a failure the file is removed, and an existing file of that
  * name is unchanged. Errors: DRAPE_E_FILE. */
@@ -89,25 +109,6 @@ drape_status drape_file_publish(drape_file *file);
  * cut back to its last complete record and stays open. Errors: DRAPE_E_FILE. */
 drape_status drape_file_keep(drape_file *file);
 
-/* Overwrites bytes that are already kept. Errors: DRAPE_E_FILE. */
-drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
-
-/* Cuts a published file to its first size bytes, as far as possible. */
-void drape_file_cut(drape_file *file, off_t size);
-
-/* Resumes a published file of a folder that an earlier process left, after its first `kept` bytes; it must
- * have at least that many. Until it is trimmed drape_file_overwrite only notes what it would do.
- * drape_file_compare checks that the file will then have the checksum in `expected`; nothing is changed
- * before drape_file_trim, which overwrites what was noted and cuts the rest. Errors: DRAPE_E_FILE,
- * DRAPE_E_MEMORY, DRAPE_E_PARSE (the file is damaged). */
-drape_status drape_file_reopen(drape_file *file);
-drape_status drape_file_compare(drape_file *file);
-drape_status drape_file_trim(drape_file *file);
-
-/* The checksum of the first bytes of a file, as the patches (NULL: none) will change them. Returns 0 or an
- * errno. */
-int drape_file_sum(int fd, off_t size, const drape_patch *patches, drape_checksum *sum);
-
 /* Waits until everything that a growing file keeps is on the disk. Errors: DRAPE_E_FILE. */
 drape_status drape_file_sync(drape_file *file);
 
@@ -117,6 +118,24 @@ drape_status drape_file_sync_names(drape_file *file);
 /* Closes a file that grew, whose manifest then has its checksum; does nothing if it is not open. Errors:
  * DRAPE_E_FILE. */
 drape_status drape_file_close(drape_file *file);
+
+/* ---- Resuming a growing file ---- */
+
+/* Archives length and checksum of the complete records, and the declared bytes; a file that is not published
+ * has length 0. The bytes of an archive that is read must live until drape_file_trim. */
+void drape_file_archive(drape_file *file, drape_archive *a);
+
+/* Opens the file of an earlier process and checks that it begins with the archived records; nothing is
+ * changed. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (the file is damaged). */
+drape_status drape_file_reopen(drape_file *file);
+
+/* Makes the reopened file what it was when it was archived, to be continued. Errors: DRAPE_E_FILE. */
+drape_status drape_file_trim(drape_file *file);
+
+/* The checksum of the first bytes of a file. Returns 0 or an errno. */
+int drape_file_sum(int fd, off_t size, drape_checksum *sum);
+
+/* ---- Reading, and folders ---- */
 
 /* Sets the message `cannot DEED "PATH": strerror(error)`. Returns DRAPE_E_FILE; for ENOMEM DRAPE_E_MEMORY. */
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error);

@@ -60,6 +60,20 @@ bool drape_folder_is_named(const void *user, const char *name)
     return strcmp(user, name) == 0;
 }
 
+bool drape_folder_matches(const char *pattern, const char *name, int64_t *number)
+{
+    while (*pattern && *pattern != '*') {
+        const size_t least = strspn(pattern, "#"), digits = strspn(name, "0123456789");
+        if (least > 0 ? digits < least : *pattern != *name)
+            return false;
+        if (least > 0 && number)
+            *number = (int64_t)strtoll(name, NULL, 10);
+        pattern += least > 0 ? least : 1;
+        name += least > 0 ? digits : 1;
+    }
+    return *pattern || !*name;
+}
+
 /* A line that cannot be read is left out: what it described is then not ours. The manifest of a folder that
  * several processes share may be empty: one of them is about to begin it. */
 static drape_status read_manifest(drape_folder *f)
@@ -213,7 +227,7 @@ static bool is_described(const json_t *lines, int fd, const struct stat *info)
         complete = true;
         if (number_of(line, "size") != (uint64_t)info->st_size)
             continue;
-        if (content.size == 0 && drape_file_sum(fd, info->st_size, NULL, &content))
+        if (content.size == 0 && drape_file_sum(fd, info->st_size, &content))
             return false;
         if (number_of(line, "checksum") == content.sum)
             return true;
@@ -221,25 +235,24 @@ static bool is_described(const json_t *lines, int fd, const struct stat *info)
     return false;
 }
 
-/* NULL: the file is ours, or does not exist. Otherwise why it is not. *info: of the file. */
-static const char *why_not_described(const drape_folder *f, const char *name, struct stat *info)
-{
-    const json_t *lines = json_object_get(f->lines, name);
-    const int fd = drape_open_regular(f->fd, name, O_RDONLY | O_NOFOLLOW);
-    if (fd < 0)
-        return errno == ENOENT ? NULL : errno == EINVAL ? "it is not a regular file" : "it cannot be read";
-    const bool ours = lines && fstat(fd, info) == 0 && is_described(lines, fd, info);
-    close(fd);
-    return ours ? NULL : lines ? "it has changed since Drape wrote it" : "Drape did not write it";
-}
-
-/* The same after all that this process, and others that share the folder, have written meanwhile. */
+/* NULL: the file is ours, or does not exist. Otherwise why it is not. The manifest is read again if this
+ * process, or one that shares the folder, may have added to it. *info: of the file. */
 static const char *why_not_ours(drape_folder *f, const char *name, struct stat *info)
 {
-    const char *why = why_not_described(f, name, info);
-    if (!why || (f->manifest < 0 && !f->shared) || read_manifest(f))
-        return why;
-    return why_not_described(f, name, info);
+    for (bool again = f->manifest >= 0 || f->shared;; again = false) {
+        const json_t *lines = json_object_get(f->lines, name);
+        const int fd = drape_open_regular(f->fd, name, O_RDONLY | O_NOFOLLOW);
+        if (fd < 0)
+            return errno == ENOENT   ? NULL
+                   : errno == EINVAL ? "it is not a regular file"
+                                     : "it cannot be read";
+        const bool ours = lines && fstat(fd, info) == 0 && is_described(lines, fd, info);
+        close(fd);
+        if (ours)
+            return NULL;
+        if (!again || read_manifest(f))
+            return lines ? "it has changed since Drape wrote it" : "Drape did not write it";
+    }
 }
 
 static bool same_file(const struct stat *a, const struct stat *b)
@@ -311,6 +324,24 @@ drape_status drape_folder_check(drape_folder *f, drape_folder_claim *writes, dra
     return visit_files(f, check_one, &(claims){writes, clears, user});
 }
 
+static drape_status unlink_one(drape_folder *f, const char *name)
+{
+    return unlinkat(f->fd, name, 0) && errno != ENOENT ? fail(f, "remove the old file", name, errno)
+                                                       : DRAPE_OK;
+}
+
+static drape_status remove_one(drape_folder *f, const char *name, const claims *c)
+{
+    struct stat info = {0};
+    const bool goes = c->clears(c->user, name) && !why_not_ours(f, name, &info) && !is_input(f, &info);
+    return goes ? unlink_one(f, name) : DRAPE_OK;
+}
+
+drape_status drape_folder_remove(drape_folder *f, drape_folder_claim *claim, const void *user)
+{
+    return visit_files(f, remove_one, &(claims){NULL, claim, user});
+}
+
 /* The beginning of the names of temporary files, by which the next process knows those of a killed one. */
 static int put_prefix(const drape_folder *f, char part[DRAPE_PART_SIZE])
 {
@@ -325,46 +356,30 @@ void drape_folder_part(const drape_folder *f, uint64_t number, char part[DRAPE_P
     snprintf(part + used, DRAPE_PART_SIZE - (size_t)used, "%016" PRIx64 DRAPE_FILE_PART, number);
 }
 
-/* Temporary files of other processes that share the folder may be in use. writes: NULL where they are
- * removed, too. */
-static drape_status remove_one(drape_folder *f, const char *name, const claims *c)
+static drape_status remove_part(drape_folder *f, const char *name, const claims *c)
 {
-    struct stat info = {0};
     char prefix[DRAPE_PART_SIZE];
-    const bool own = !c->writes && !f->shared;
-    const size_t length = own ? (size_t)put_prefix(f, prefix) : 0;
-    const bool claimed = c->clears && c->clears(c->user, name),
-               part = own && strncmp(name, prefix, length) == 0 &&
-                      strspn(name + length, "0123456789abcdef") == 16 &&
+    const size_t length = (size_t)put_prefix(f, prefix);
+    (void)c;
+    const bool part = strncmp(name, prefix, length) == 0 && strspn(name + length, "0123456789abcdef") == 16 &&
                       strcmp(name + length + 16, DRAPE_FILE_PART) == 0;
-    if (!part && (!claimed || why_not_ours(f, name, &info) || is_input(f, &info)))
-        return DRAPE_OK;
-    return unlinkat(f->fd, name, 0) && errno != ENOENT ? fail(f, "remove the old file", name, errno)
-                                                       : DRAPE_OK;
-}
-
-drape_status drape_folder_remove(drape_folder *f, drape_folder_claim *claim, const void *user)
-{
-    return visit_files(f, remove_one, &(claims){claim, claim, user});
+    return part ? unlink_one(f, name) : DRAPE_OK;
 }
 
 /* ---- The manifest ---- */
 
-/* Each line is one write, since processes that share a folder add to one manifest. A line that does not fit
- * on the disk is taken back, if no other can follow it. */
+/* Each line is one write, since processes that share a folder add to one manifest. Of a line that did not
+ * fit on the disk a piece may remain, which readers leave out; the next line begins after its end. */
 static drape_status add_line(drape_folder *f, const char *line, bool durable)
 {
     char text[LINE_SIZE + 2];
-    struct stat info;
     ssize_t n;
     const int length = snprintf(text, sizeof text, "%s%s\n", f->torn ? "\n" : "", line);
     do
         n = write(f->manifest, text, (size_t)length);
     while (n < 0 && errno == EINTR);
     int error = n == length ? 0 : n < 0 ? errno : EFBIG;
-    f->torn = (n < 0 && f->torn) ||
-              (n > 0 && error &&
-               (f->shared || fstat(f->manifest, &info) || ftruncate(f->manifest, info.st_size - n)));
+    f->torn = error && (f->torn || n > 0);
     if (!error && durable && fdatasync(f->manifest) && errno != EINVAL)
         error = errno;
     return error ? fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
@@ -407,21 +422,20 @@ static drape_status add_known(drape_folder *f)
     json_t *lines, *line;
     size_t i;
     struct stat info;
+    drape_status status = DRAPE_OK;
     json_object_foreach(f->lines, name, lines)
     {
-        drape_status status = DRAPE_OK;
-        const bool there = fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW) == 0;
+        if (fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW))
+            continue;
         json_array_foreach(lines, i, line)
         {
             const bool growing = is_growing(line);
-            if (there && !status)
+            if (!status)
                 status = add_file(f, name, growing, number_of(line, growing ? "inode" : "size"),
                                   number_of(line, growing ? "born" : "checksum"), false);
         }
-        if (status)
-            return status;
     }
-    return DRAPE_OK;
+    return status;
 }
 
 /* Renames a file to a name that no other has, in one call. A file system without links is looked at first. */
@@ -436,13 +450,15 @@ static int rename_new(const drape_folder *f, const char *part, const char *name)
     return -1;
 }
 
-/* A manifest that is shared is continued. Otherwise a new one takes the place of the old when it is
- * complete. */
+/* A manifest that is shared is continued, and temporary files there may be in use. Otherwise a new manifest
+ * takes the place of the old one when it is complete. */
 drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, const void *user)
 {
     const int flags = O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC;
     char name[DRAPE_PART_SIZE] = DRAPE_MANIFEST_NAME, head[LINE_SIZE];
-    drape_status status = visit_files(f, remove_one, &(claims){NULL, clears, user});
+    drape_status status = clears ? drape_folder_remove(f, clears, user) : DRAPE_OK;
+    if (!status && !f->shared)
+        status = visit_files(f, remove_part, NULL);
     if (status)
         return status;
     if (!f->shared)
@@ -496,32 +512,21 @@ drape_status drape_folder_sync(drape_folder *f)
 
 /* ---- Resuming ---- */
 
-drape_status drape_folder_verify(drape_folder *f, const char *name)
-{
-    struct stat info;
-    if (fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW))
-        return fail(f, "continue", name, errno);
-    const char *why = why_not_ours(f, name, &info);
-    return why ? drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s",
-                            f->path, name, why)
-               : DRAPE_OK;
-}
-
-drape_status drape_folder_verify_all(drape_folder *f, bool complete, const char *except)
+drape_status drape_folder_verify(drape_folder *f, drape_folder_claim *needed, const void *user)
 {
     const char *name;
-    json_t *lines, *line;
-    size_t i;
+    json_t *lines;
     struct stat info;
     json_object_foreach(f->lines, name, lines)
     {
-        bool growing = false;
-        json_array_foreach(lines, i, line) growing = growing || is_growing(line);
-        const bool there = fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW) == 0;
-        const bool needed = complete ? there || strcmp(name, except) != 0 : there && !growing;
-        const drape_status status = needed ? drape_folder_verify(f, name) : DRAPE_OK;
-        if (status)
-            return status;
+        const bool missing = fstatat(f->fd, name, &info, AT_SYMLINK_NOFOLLOW) != 0;
+        const bool grows = is_growing(json_array_get(lines, json_array_size(lines) - 1));
+        const char *why = missing && needed(user, name) ? "it is missing"
+                          : missing || grows            ? NULL
+                                                        : why_not_ours(f, name, &info);
+        if (why)
+            return drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s",
+                              f->path, name, why);
     }
     return DRAPE_OK;
 }

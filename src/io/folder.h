@@ -33,6 +33,10 @@ typedef bool drape_folder_claim(const void *user, const char *name);
 /* One of the single name in `user`. */
 bool drape_folder_is_named(const void *user, const char *name);
 
+/* Whether a name is of a pattern, in which n signs # in a row stand for n digits or more, and a * at the end
+ * for anything. *number: the last of these numbers (NULL: it is not needed). */
+bool drape_folder_matches(const char *pattern, const char *name, int64_t *number);
+
 /* Makes the folder and its missing parents, locks it and reads its manifest. shared: other processes may
  * write other files into it at the same time, if they open it as shared too. Errors: DRAPE_E_ARGUMENT (it
  * is locked, or it has a manifest of another format), DRAPE_E_FILE, DRAPE_E_MEMORY. */
@@ -65,14 +69,10 @@ drape_status drape_folder_begin(drape_folder *folder, drape_folder_claim *clears
 /* Removes those of our files that are claimed. Errors: DRAPE_E_FILE. */
 drape_status drape_folder_remove(drape_folder *folder, drape_folder_claim *claim, const void *user);
 
-/* Checks that a file has the bytes that the manifest describes. Errors: DRAPE_E_PARSE (it is missing or
- * damaged), DRAPE_E_FILE. */
-drape_status drape_folder_verify(drape_folder *folder, const char *name);
-
-/* The same for all files that the manifest describes but those still growing when a process was killed:
- * what they must be is known elsewhere. complete: no file may be missing but `except`, which is written
- * again. */
-drape_status drape_folder_verify_all(drape_folder *folder, bool complete, const char *except);
+/* Checks before drape_folder_begin, when a run is resumed, that all files of the manifest have the bytes that
+ * it describes. Files that were still growing when a process was killed are left out: what they must be is
+ * known elsewhere. A file that is missing is a fault if `needed` claims it. Errors: DRAPE_E_PARSE. */
+drape_status drape_folder_verify(drape_folder *folder, drape_folder_claim *needed, const void *user);
 
 /* ---- For io/file.c ---- */
 

@@ -50,6 +50,7 @@ struct drape_recorder {
     size_t body_count, point_count;
     drape_file steps, energies, whole; /* whole: for the formats */
     drape_file checkpoint;             /* the file of the checkpoints; without a path none are written */
+    drape_file *growing;               /* list of the tables and the files of the formats that grow */
     int64_t every; /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
     double start;  /* [s] clock when the run began */
     drape_recorder_progress progress;
@@ -223,7 +224,7 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
     for (size_t i = 0; i < r->output_count && !r->failure; i++) {
         const output *o = &r->outputs[i];
         if (!is_shared(r, o))
-            note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? &frame : &rotated));
+            note(r, o->ops->write(&r->def, o->state, o->ops->y_up ? &frame : &rotated));
     }
     if (!r->failure)
         note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
@@ -272,22 +273,6 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
 
 /* ---- Checkpoints ---- */
 
-/* The files that grow: the tables, then those of the formats. NULL: there are no more. */
-static drape_file *growing(drape_recorder *r, size_t number)
-{
-    if (number < 2)
-        return number ? &r->energies : &r->steps;
-    number -= 2;
-    for (size_t i = 0; i < r->output_count; i++) {
-        const output *o = &r->outputs[i];
-        drape_file *file = NULL;
-        for (size_t k = 0; o->ops->file && (file = o->ops->file(o->state, k)); k++)
-            if (number-- == 0)
-                return file;
-    }
-    return NULL;
-}
-
 /* The names of the formats are in their order, which is that of the scene's list. */
 static void archive_progress(drape_recorder *r, drape_archive *a)
 {
@@ -318,22 +303,13 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     drape_archive_double(a, &r->progress.wall);
 }
 
-/* What the formats remember, then of each file that grows how many bytes to keep, and their checksum. */
 static void archive_files(drape_recorder *r, drape_archive *a)
 {
-    drape_file *file;
     for (size_t i = 0; i < r->output_count && !a->status; i++)
         if (r->outputs[i].ops->archive)
             r->outputs[i].ops->archive(r->outputs[i].state, a);
-    for (size_t k = 0; (file = growing(r, k)); k++) {
-        int64_t bytes = file->kept, sum = (int64_t)file->kept_sum.sum;
-        drape_archive_int64(a, &bytes);
-        drape_archive_int64(a, &sum);
-        if (drape_archive_has_read(a)) {
-            file->kept = (off_t)bytes;
-            file->expected = (uint64_t)sum;
-        }
-    }
+    for (drape_file *file = r->growing; file; file = file->next)
+        drape_file_archive(file, a);
 }
 
 /* All frames that a checkpoint counts must be on the disk before the checkpoint is. */
@@ -341,8 +317,7 @@ static drape_status write_checkpoint(drape_recorder *r)
 {
     drape_checkpoint c;
     drape_status status = DRAPE_OK;
-    drape_file *file;
-    for (size_t k = 0; r->progress.writes && !status && (file = growing(r, k)); k++)
+    for (drape_file *file = r->growing; file && !status; file = file->next)
         status = drape_file_sync(file);
     if (r->progress.writes && !status)
         status = drape_folder_sync(r->folder);
@@ -485,23 +460,26 @@ static drape_status allocate_arrays(drape_recorder *r)
 /* A table, the checkpoint, or a file that the caller writes. */
 static bool is_own_name(const drape_recorder *r, const char *name)
 {
-    for (size_t i = 0; i < r->also_count; i++) {
-        const char *star = strchr(r->also[i], '*');
-        if (star ? strncmp(name, r->also[i], (size_t)(star - r->also[i])) == 0 : !strcmp(name, r->also[i]))
+    for (size_t i = 0; i < r->also_count; i++)
+        if (drape_folder_matches(r->also[i], name, NULL))
             return true;
-    }
     return strcmp(name, DRAPE_STEPS_NAME) == 0 || strcmp(name, DRAPE_ENERGY_NAME) == 0 ||
            strcmp(name, DRAPE_CHECKPOINT_NAME) == 0;
+}
+
+/* A file of the frames that this run writes. */
+static bool shows_frames(const drape_recorder *r, const char *name)
+{
+    for (size_t i = 0; i < r->output_count; i++)
+        if (drape_export_names(r->outputs[i].ops, name))
+            return true;
+    return false;
 }
 
 /* What this run writes. */
 static bool writes(const void *user, const char *name)
 {
-    const drape_recorder *r = user;
-    for (size_t i = 0; i < r->output_count; i++)
-        if (drape_export_names(r->outputs[i].ops, name))
-            return true;
-    return is_own_name(r, name);
+    return shows_frames(user, name) || is_own_name(user, name);
 }
 
 /* What an earlier run may have written, in any format: frames of two runs must not be mixed. */
@@ -521,6 +499,15 @@ static bool is_late(const void *user, const char *name)
         if (drape_export_frame_of(r->outputs[i].ops, name) >= r->progress.frames)
             return true;
     return false;
+}
+
+/* What must be there when a run is resumed: after its end all but the summary, which is written again. */
+static bool is_needed(const void *user, const char *name)
+{
+    const drape_recorder *r = user;
+    if (r->progress.finished)
+        return strcmp(name, DRAPE_SUMMARY_NAME) != 0;
+    return r->progress.frames > 0 && shows_frames(r, name) && !is_late(r, name);
 }
 
 static drape_status protect(void *user, const char *path, const char *pointer)
@@ -549,6 +536,7 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
         drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
     r->whole.durable = def->checkpoints;
     r->def = def_of(r->sim);
+    r->def.ctx = r->ctx;
     if (r->counted)
         r->def.most_frames = def->frames;
     r->def.arena = &r->arena;
@@ -556,21 +544,35 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
     r->def.durable = def->checkpoints;
     r->def.resumes = def->archive != NULL;
     r->def.whole = &r->whole;
+    r->def.growing = &r->growing;
     r->def.bodies = r->bodies;
     r->def.body_count = (int32_t)r->body_count;
     return DRAPE_OK;
 }
 
-static drape_status open_formats(drape_recorder *r)
+static drape_status open_table(drape_recorder *r, const char *name, const char *columns, drape_file *file)
+{
+    drape_status status = drape_export_open(&r->def, name, file);
+    if (status || r->def.resumes)
+        return status;
+    drape_file_put_text(file, columns);
+    return drape_file_publish(file);
+}
+
+/* All files that grow. */
+static drape_status open_files(drape_recorder *r)
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; i < r->output_count && !status; i++)
-        status = r->outputs[i].ops->open(r->ctx, &r->def, r->outputs[i].state);
-    return status;
+        if (r->outputs[i].ops->open)
+            status = r->outputs[i].ops->open(&r->def, r->outputs[i].state);
+    if (!status)
+        status = open_table(r, DRAPE_STEPS_NAME, drape_steps_columns, &r->steps);
+    return status ? status : open_table(r, DRAPE_ENERGY_NAME, drape_energy_columns, &r->energies);
 }
 
-/* Nothing is touched by a refusal. A checkpoint of an earlier run is removed first, because it counts frames
- * that are removed next. */
+/* Nothing is changed if the run is refused. A checkpoint of an earlier run is removed first, because it
+ * counts frames that are removed next. */
 static drape_status begin_files(drape_recorder *r)
 {
     drape_status status = drape_folder_check(r->folder, writes, clears, r);
@@ -578,74 +580,42 @@ static drape_status begin_files(drape_recorder *r)
         status = drape_folder_remove(r->folder, drape_folder_is_named, DRAPE_CHECKPOINT_NAME);
     if (!status)
         status = drape_folder_begin(r->folder, clears, r);
-    if (!status)
-        status = open_formats(r);
-    if (!status)
-        status = drape_csv_open(r->ctx, r->folder, DRAPE_STEPS_NAME, drape_steps_columns, &r->steps);
-    return status ? status
-                  : drape_csv_open(r->ctx, r->folder, DRAPE_ENERGY_NAME, drape_energy_columns, &r->energies);
+    return status ? status : open_files(r);
 }
 
-/* Opens all files that grow, reads from the checkpoint how far they do, and checks that all files have the
- * bytes that the checkpoint and the manifest describe; nothing is changed. */
-static drape_status reopen_files(drape_recorder *r, drape_archive *a)
-{
-    drape_file *file;
-    drape_status status = drape_export_open(r->ctx, &r->def, DRAPE_STEPS_NAME, &r->steps);
-    if (!status)
-        status = drape_export_open(r->ctx, &r->def, DRAPE_ENERGY_NAME, &r->energies);
-    if (!status)
-        status = open_formats(r);
-    if (status)
-        return status;
-    archive_files(r, a);
-    status = drape_archive_end(a);
-    for (size_t k = 0; !status && (file = growing(r, k)); k++)
-        if (file->kept > 0)
-            status = drape_file_reopen(file);
-    for (size_t i = 0; i < r->output_count && !status; i++) {
-        const output *o = &r->outputs[i];
-        for (int64_t k = 0; o->ops->ending && k < r->progress.frames && !status; k++) {
-            drape_file_name(&r->whole, DRAPE_FRAME_NAME, k, o->ops->ending);
-            status = drape_folder_verify(r->folder, r->whole.path);
-        }
-        if (!status && o->ops->cut)
-            status = o->ops->cut(r->ctx, o->state, r->progress.frames);
-    }
-    for (size_t k = 0; !status && (file = growing(r, k)); k++)
-        if (file->kept > 0)
-            status = drape_file_compare(file);
-    return status ? status : drape_folder_check(r->folder, is_late, clears, r);
-}
-
-/* Removes what follows the frames of the checkpoint. Files of formats that are not written now belong to
- * another run and stay as they are. */
+/* Reads from the checkpoint what the files that grow were, compares all files with what the checkpoint and
+ * the manifest describe, and only then removes what follows the frames of the checkpoint. Files of formats
+ * that are not written now belong to another run and stay as they are. */
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
     const bool finished = r->progress.finished;
-    drape_file *file;
-    drape_status status = finished ? drape_archive_end(a) : DRAPE_OK;
-    if (!status)
-        status = drape_folder_verify_all(r->folder, finished, DRAPE_SUMMARY_NAME);
+    drape_status status = finished ? DRAPE_OK : open_files(r);
     if (!status && !finished)
-        status = reopen_files(r, a);
+        archive_files(r, a);
     if (!status)
-        status = drape_folder_begin(r->folder, NULL, r);
-    if (status || finished)
-        return status;
-    for (size_t k = 0; !status && (file = growing(r, k)); k++)
+        status = drape_archive_end(a);
+    if (!status)
+        status = drape_folder_verify(r->folder, is_needed, r);
+    for (drape_file *file = r->growing; file && !status; file = file->next)
+        status = file->kept > 0 ? drape_file_reopen(file) : DRAPE_OK;
+    if (!status && !finished)
+        status = drape_folder_check(r->folder, is_late, clears, r);
+    if (!status)
+        status = drape_folder_begin(r->folder, NULL, NULL);
+    for (drape_file *file = r->growing; file && !status; file = file->next)
         status = file->kept > 0 ? drape_file_trim(file) : drape_file_begin(file);
-    return status ? status : drape_folder_remove(r->folder, is_late, r);
+    return status || finished ? status : drape_folder_remove(r->folder, is_late, r);
 }
 
 static void close_files(drape_recorder *r)
 {
-    drape_file *file;
-    for (size_t i = 0; i < r->output_count && r->live; i++)
-        if (r->outputs[i].ops->close)
-            note(r, r->outputs[i].ops->close(r->ctx, r->outputs[i].state));
+    if (!r->live)
+        return;
     r->live = false;
-    for (size_t k = 0; (file = growing(r, k)); k++)
+    for (size_t i = 0; i < r->output_count; i++)
+        if (r->outputs[i].ops->close)
+            note(r, r->outputs[i].ops->close(&r->def, r->outputs[i].state));
+    for (drape_file *file = r->growing; file; file = file->next)
         note(r, drape_file_close(file));
 }
 
@@ -699,8 +669,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     status = DRAPE_OK;
     r->also_count = 0;
     if (r->failure) {
-        close_files(r);
-        status = report(r); /* the first failure, not one of closing */
+        status = report(r);
         drape_recorder_destroy(&r);
     }
     *out = r;
@@ -729,10 +698,11 @@ void drape_recorder_destroy(drape_recorder **recorder)
     if (!recorder || !*recorder)
         return;
     drape_recorder *r = *recorder;
-    drape_file *file;
     close_files(r);
-    for (size_t k = 0; (file = growing(r, k)); k++)
+    for (drape_file *file = r->growing, *next; file; file = next) {
+        next = file->next;
         drape_file_destroy(file);
+    }
     drape_file_destroy(&r->whole);
     drape_file_destroy(&r->checkpoint);
     drape_folder_close(&r->folder);

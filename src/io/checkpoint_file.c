@@ -1,4 +1,4 @@
-/* checkpoint.c: checkpoints as files: see recorder.h. */
+/* checkpoint_file.c: checkpoints as files: see recorder.h. */
 #include "io/recorder.h"
 
 #include "sim/sim.h"
