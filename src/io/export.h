@@ -3,30 +3,9 @@
 #define DRAPE_IO_EXPORT_H
 
 #include "base/archive.h"
-#include "base/arena.h"
 #include "base/registry.h"
 #include "io/file.h"
-#include "model/model.h"
-
-/* The surface of a collider, as an object of its own beside the cloth. Its vertices are in its own
- * coordinates, and are where its pose puts them in a frame; those of a collider that deforms are the points
- * of its shape, which each frame has. */
-typedef struct drape_export_body {
-    const char *name;
-    bool deforms, moves; /* moves: its pose may differ from that of the first frame */
-    int32_t vertex_count, triangle_count;
-    float *vertex;       /* (vertex_count x 6) position [m] and normal; NULL if it deforms */
-    int32_t *triangle;   /* (triangle_count x 3), counterclockwise from outside */
-    int32_t first_point; /* of its points among those of all colliders that deform */
-} drape_export_body;
-
-/* Makes those of all colliders (collider_count). An endless one, as a plane, is cut off at two diagonals of
- * the cloth at rest from the point nearest to its middle. Errors: DRAPE_E_MEMORY. */
-drape_status drape_export_bodies_create(drape_arena *arena, const drape_model *model,
-                                        drape_export_body **bodies);
-
-/* The number of points of all colliders that deform. */
-size_t drape_export_points(const drape_model *model);
+#include "io/frame.h"
 
 /* The target of the frames, known before the first one. It is valid until close. */
 typedef struct drape_export_def {
@@ -43,23 +22,6 @@ typedef struct drape_export_def {
     const drape_export_body *bodies; /* (body_count) of formats that want them: the colliders */
     int32_t body_count;
 } drape_export_def;
-
-/* A frame of the model's surface. Its vectors are rotated if the format has another vertical axis than the
- * scene. */
-typedef struct drape_frame {
-    int64_t index;           /* counts from 0 without gaps */
-    double time;             /* [s] */
-    const double *positions; /* of the nodes of the surface (node_count x 3) [m] */
-    const double *nodes;     /* of the nodes of the model (node_count x 3) [m], never rotated */
-    /* For formats that want fields; otherwise NULL: */
-    const double *velocities;     /* (node_count x 3) [m/s] */
-    const double *strain;         /* (triangle_count x 2) as drape_model_strain */
-    const double *energy_density; /* (node_count) [J/m2], of the state at or after the frame */
-    const uint8_t *pinned;        /* (node_count) */
-    /* For formats that want bodies; otherwise NULL: */
-    const drape_collider_pose *poses; /* (body_count) */
-    const double *points;             /* of all bodies that deform, in space [m] */
-} drape_frame;
 
 /*
  * A format. The recorder zeroes state_size bytes, calls open once, write for each frame, and close once if
@@ -100,10 +62,6 @@ typedef struct drape_exporter_ops {
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
 extern const drape_registry drape_exporter_registry;
-
-/* Where a vertex of a body is in space [m]; number: that of its collider. */
-void drape_export_body_vertex(const drape_frame *frame, const drape_export_body *body, int32_t number,
-                              int32_t vertex, double x[3]);
 
 /* Whether a format writes a file of this name. */
 bool drape_export_names(const drape_exporter_ops *ops, const char *name);

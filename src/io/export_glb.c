@@ -100,7 +100,6 @@ typedef struct glb_state {
     int32_t *node;                                            /* (vertices) the point of each */
     const double **uv; /* (vertices of the cloths) texture coordinates; NULL: no cloth has any */
     uint32_t *corner;  /* (triangles x 3) vertices of the object, in the order of the primitives */
-    double *x;         /* (points x 3) positions of the frame, if there are points of colliders */
     double *normal;    /* (points x 3) normals of the frame */
     float *base[2];    /* (points x 3) positions and normals of the first frame: nodes, points of colliders */
     float *moved[2];   /* (points x 3) their differences from these in the frame; the first one has its own */
@@ -513,7 +512,7 @@ static double frame_room(double objects, double primitives)
 static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
 {
     const drape_render_surface *surface = &def->model->surface;
-    double frames = (double)def->most_frames, vertices = (double)drape_export_points(def->model);
+    double frames = (double)def->most_frames, vertices = (double)drape_frame_points(def->model);
     double primitives = 1 + def->model->collider_count;
     for (int32_t c = 0; c < surface->cloth_count; c++) {
         const drape_mesh *mesh = surface->cloths[c].mesh;
@@ -555,8 +554,6 @@ static drape_status glb_open(const drape_export_def *def, void *state)
         glb->base[part] = drape_arena_take(arena, count, sizeof **glb->base);
         glb->moved[part] = drape_arena_take(arena, count, sizeof **glb->moved);
     }
-    if (glb->deforming > 1)
-        glb->x = drape_arena_take(arena, count, sizeof *glb->x);
     glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
@@ -616,13 +613,8 @@ static void write_lengths(glb_state *glb, uint32_t positions)
 static void find_differences(glb_state *glb, const drape_frame *frame)
 {
     const drape_render_surface *surface = &glb->def->model->surface;
-    const size_t nodes = 3 * (size_t)surface->node_count, numbers = 3 * (size_t)glb->points;
+    const size_t numbers = 3 * (size_t)glb->points;
     const double *x = frame->positions;
-    if (glb->x) {
-        memcpy(glb->x, x, nodes * sizeof *x);
-        memcpy(glb->x + nodes, frame->points, (numbers - nodes) * sizeof *x);
-        x = glb->x;
-    }
     memset(glb->normal, 0, numbers * sizeof *glb->normal);
     drape_add_normals(x, surface->triangle, (size_t)surface->triangle_count, glb->normal);
     for (uint32_t i = 1; i < glb->deforming; i++) {

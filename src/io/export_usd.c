@@ -343,9 +343,9 @@ static void include(object *o, const double *x)
 
 static const double *point_at(const usd_state *usd, const object *o, const drape_frame *frame, int32_t i)
 {
-    return o->body < 0
-               ? frame->positions + 3 * (size_t)(usd->def->model->surface.cloths[o->cloth].first_node + i)
-               : frame->points + 3 * (size_t)(body_of(usd, o)->first_point + i);
+    const int32_t first =
+        o->body < 0 ? usd->def->model->surface.cloths[o->cloth].first_node : body_of(usd, o)->first_point;
+    return frame->positions + 3 * (size_t)(first + i);
 }
 
 /* The sample of a frame: in one line, which may be a comment. */

@@ -199,15 +199,20 @@ static void put_cloths(drape_file *file, const array *a)
 typedef struct body_points {
     const drape_frame *frame;
     const drape_export_body *body;
-    int32_t number;
+    const drape_collider_pose *pose;
 } body_points;
 
 static void put_body_points(drape_file *file, const array *a)
 {
     const body_points *of = a->from;
-    for (int32_t i = 0; i < of->body->vertex_count; i++) {
+    const drape_export_body *body = of->body;
+    for (int32_t i = 0; i < body->vertex_count; i++) {
         double x[3];
-        drape_export_body_vertex(of->frame, of->body, of->number, i, x);
+        for (size_t k = 0; k < 3; k++)
+            x[k] = body->deforms ? of->frame->positions[3 * (size_t)(body->first_point + i) + k]
+                                 : (double)body->vertex[6 * (size_t)i + k];
+        if (!body->deforms)
+            drape_pose_point(of->pose, x, x);
         drape_file_put_doubles(file, x, 3);
     }
 }
@@ -217,7 +222,7 @@ static drape_status write_body(const drape_export_def *def, const drape_frame *f
 {
     const drape_export_body *body = &def->bodies[number];
     const size_t cells = (size_t)body->triangle_count;
-    const body_points points = {frame, body, number};
+    const body_points points = {frame, body, &frame->poses[number]};
     const array list[] = {
         {"Float64", "Points", 3, 3 * (size_t)body->vertex_count, 8, put_body_points, &points, 1},
         {"Int32", "collider", 1, cells, 4, put_words, &number, 0},

@@ -38,25 +38,15 @@ struct drape_recorder {
     drape_export_def def; /* for the formats */
     output *outputs;
     size_t output_count;
-    double *fields;             /* of one frame; NULL if no format wants any */
-    double *normals, *surface;  /* of the nodes at a frame; positions of the surface; NULL: no render mesh */
-    double *shown;              /* fields of the surface; NULL: those of the nodes and triangles */
-    int32_t *shown_triangle;    /* of the simulation, by each one of the surface; NULL likewise */
-    uint8_t *pinned;            /* by each node of the surface; NULL likewise */
-    double *rotated;            /* positions and velocities with z up; NULL if no format wants them */
-    drape_export_body *bodies;  /* (body_count) the colliders; NULL if no format wants them */
-    drape_collider_pose *poses; /* (2 x body_count) of a frame, and these with z up */
-    double *points;             /* (2 x point_count x 3) of those that deform, likewise */
-    size_t body_count, point_count;
+    drape_frames frames;
     drape_file steps, energies, whole; /* whole: for the formats */
     drape_file checkpoint;             /* the file of the checkpoints; without a path none are written */
     drape_file *growing;               /* list of the tables and the files of the formats that grow */
     int64_t every; /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
     double start;  /* [s] clock when the run began */
     drape_recorder_progress progress;
-    double last_time; /* [s] of the last frame */
-    bool moved;       /* a step was accepted after the last frame */
-    bool wants_fields;
+    double last_time;     /* [s] of the last frame */
+    bool moved;           /* a step was accepted after the last frame */
     bool gathers;         /* ranks share the model, and a format is written by rank 0 */
     bool counted;         /* the def says how many frames come */
     bool live;            /* the files can be written */
@@ -104,74 +94,6 @@ static drape_status report(drape_recorder *r)
 
 /* ---- Frames ---- */
 
-/* (x, y, z) to (x, -z, y): a quarter turn about x. */
-static const double *rotate(const double *from, size_t count, double *to)
-{
-    for (size_t i = 0; i < 3 * count; i += 3) {
-        to[i] = from[i];
-        to[i + 1] = -from[i + 2];
-        to[i + 2] = from[i + 1];
-    }
-    return to;
-}
-
-/* Adds the fields to the frame, if a format wants any; their density of energy is there already. With render
- * meshes they are those at the nodes and triangles of the surface. */
-static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
-{
-    const drape_model *model = drape_model_whole(r->sim->model);
-    const size_t nodes = (size_t)model->surface.node_count, triangles = (size_t)model->surface.triangle_count;
-    if (!r->fields)
-        return;
-    double *density = r->fields, *strain = density + model->node_count;
-    drape_model_strain(model, frame->nodes, strain);
-    frame->velocities = velocities;
-    frame->strain = strain;
-    frame->energy_density = density;
-    frame->pinned = model->pinned;
-    if (!r->shown)
-        return;
-    double *shown_density = r->shown + 3 * nodes, *shown_strain = shown_density + nodes;
-    drape_render_values(model, velocities, 3, r->shown);
-    drape_render_values(model, density, 1, shown_density);
-    for (size_t t = 0; t < triangles; t++)
-        memcpy(shown_strain + 2 * t, strain + 2 * (size_t)r->shown_triangle[t], 2 * sizeof *strain);
-    drape_render_pinned(model, r->pinned);
-    frame->velocities = r->shown;
-    frame->strain = shown_strain;
-    frame->energy_density = shown_density;
-    frame->pinned = r->pinned;
-}
-
-/* The frame with z up. */
-static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
-{
-    size_t nodes = (size_t)r->model->surface.node_count;
-    drape_frame rotated = *frame;
-    double turn[9];
-    rotated.positions = rotate(frame->positions, nodes, r->rotated);
-    if (frame->velocities)
-        rotated.velocities = rotate(frame->velocities, nodes, r->rotated + 3 * nodes);
-    for (size_t i = 0; i < r->body_count; i++) {
-        const drape_collider_pose *from = &r->poses[i];
-        drape_collider_pose *to = &r->poses[r->body_count + i];
-        for (int k = 0; k < 9; k++)
-            turn[k] = from->turned ? from->turn[k] : k % 4 == 0;
-        for (int k = 0; k < 3; k++) {
-            to->turn[k] = turn[k];
-            to->turn[3 + k] = -turn[6 + k];
-            to->turn[6 + k] = turn[3 + k];
-        }
-        to->turned = true;
-        rotate(from->displacement, 1, to->displacement);
-    }
-    if (r->body_count > 0) {
-        rotated.poses = r->poses + r->body_count;
-        rotated.points = rotate(r->points, r->point_count, r->points + 3 * r->point_count);
-    }
-    return rotated;
-}
-
 /* Whether the ranks write the frames of a format together. */
 static bool is_shared(const drape_recorder *r, const output *o)
 {
@@ -200,31 +122,15 @@ static void gather(drape_recorder *r, int array, int width, const double **value
 static void write_all(drape_recorder *r, double time, const double *positions, const double *velocities,
                       const drape_energy *energy)
 {
-    const drape_motion *motion = drape_system_motion(r->sim->system);
-    drape_frame frame = {
-        .index = r->progress.frames, .time = time, .nodes = positions, .positions = positions};
-    if (r->model->surface.bound) { /* vertices of render meshes are where the nodes carry them */
-        drape_model_normals(r->model, positions, r->normals);
-        drape_render_positions(r->model, -1, positions, r->normals, r->surface);
-        frame.positions = r->surface;
-    }
-    add_fields(r, velocities, &frame);
-    for (size_t i = 0; i < r->body_count; i++) { /* where the colliders are at that time */
-        const drape_export_body *body = &r->bodies[i];
-        double *x = r->points + 3 * (size_t)body->first_point;
-        drape_motion_pose(motion, (int32_t)i, time, time, &r->poses[i]);
-        if (body->deforms)
-            drape_motion_points(motion, (int32_t)i, time, x);
-        for (int32_t p = 0; body->deforms && p < body->vertex_count; p++, x += 3)
-            drape_pose_point(&r->poses[i], x, x);
-    }
-    frame.poses = r->poses;
-    frame.points = r->points;
-    const drape_frame rotated = r->rotated ? rotated_frame(r, &frame) : frame;
+    drape_frames *f = &r->frames;
+    f->frame.index = r->progress.frames;
+    f->frame.time = time;
+    f->frame.nodes = positions;
+    drape_frames_make(f, drape_model_whole(r->sim->model), drape_system_motion(r->sim->system), velocities);
     for (size_t i = 0; i < r->output_count && !r->failure; i++) {
         const output *o = &r->outputs[i];
         if (!is_shared(r, o))
-            note(r, o->ops->write(&r->def, o->state, o->ops->y_up ? &frame : &rotated));
+            note(r, o->ops->write(&r->def, o->state, o->ops->y_up ? &f->frame : &f->rotated));
     }
     if (!r->failure)
         note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
@@ -254,13 +160,14 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
             note(r, drape_fail(r->ctx, DRAPE_E_FILE, "another rank cannot write"));
     }
     gather(r, 0, 3, &positions);
-    if (r->wants_fields) {
-        const double *density = r->fields;
+    double *field = r->frames.node_density;
+    if (field) {
+        const double *density = field;
         gather(r, 1, 3, &velocities);
-        drape_sim_energy_density(r->sim, r->fields);
+        drape_sim_energy_density(r->sim, field);
         gather(r, 2, 1, &density);
         if (r->ranks && r->progress.writes)
-            memcpy(r->fields, density, (size_t)r->model->node_count * sizeof *density);
+            memcpy(field, density, (size_t)r->model->node_count * sizeof *density);
     }
     if (r->progress.writes)
         write_all(r, time, positions, velocities, &energy);
@@ -413,46 +320,22 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
     return DRAPE_OK;
 }
 
-static drape_status allocate_arrays(drape_recorder *r)
+static drape_status allocate_frames(drape_recorder *r)
 {
-    const drape_model *model = r->model;
-    const drape_render_surface *s = &model->surface;
-    const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
-    const size_t shown = (size_t)s->node_count, faces = (size_t)s->triangle_count;
-    bool rotates = false, bodies = false;
+    bool rotates = false, bodies = false, fields = false, gathers = false;
     for (size_t i = 0; i < r->output_count; i++) {
-        r->wants_fields = r->wants_fields || r->outputs[i].ops->wants_fields;
-        bodies = bodies || r->outputs[i].ops->wants_bodies;
-        rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
-        r->gathers = r->gathers || (r->ranks && !is_shared(r, &r->outputs[i]));
+        const drape_exporter_ops *ops = r->outputs[i].ops;
+        fields = fields || ops->wants_fields;
+        bodies = bodies || ops->wants_bodies;
+        rotates = rotates || (r->model->z_up && !ops->y_up);
+        gathers = gathers || (r->ranks && !is_shared(r, &r->outputs[i]));
     }
-    if (r->gathers && r->progress.writes)
-        r->gathered = drape_arena_take(&r->arena, nodes, (r->wants_fields ? 9 : 3) * sizeof(double));
-    if (r->wants_fields)
-        r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof(double));
-    if (rotates)
-        r->rotated = drape_arena_take(&r->arena, 6 * shown, sizeof(double));
-    if (s->bound) {
-        r->normals = drape_arena_take(&r->arena, nodes, 3 * sizeof(double));
-        r->surface = drape_arena_take(&r->arena, shown, 3 * sizeof(double));
-    }
-    if (s->bound && r->wants_fields) {
-        r->shown = drape_arena_take(&r->arena, 4 * shown + 2 * faces, sizeof(double));
-        r->shown_triangle = drape_arena_take(&r->arena, faces, sizeof *r->shown_triangle);
-        r->pinned = drape_arena_take(&r->arena, shown, sizeof *r->pinned);
-        if (r->shown_triangle)
-            drape_render_triangles(model, r->shown_triangle);
-    }
-    if (!bodies || model->collider_count == 0)
-        return drape_arena_status(&r->arena);
-    r->body_count = (size_t)model->collider_count;
-    r->point_count = drape_export_points(model);
-    r->poses = drape_arena_take(&r->arena, 2 * r->body_count, sizeof *r->poses);
-    r->points = drape_arena_take(&r->arena, 2 * r->point_count, 3 * sizeof *r->points);
-    const drape_status status = drape_export_bodies_create(&r->arena, model, &r->bodies);
-    for (size_t i = 0; i < r->body_count && !status; i++)
-        r->bodies[i].moves = drape_motion_moves_collider(drape_system_motion(r->sim->system), (int32_t)i);
-    return status ? status : drape_arena_status(&r->arena);
+    r->gathers = gathers;
+    if (gathers && r->progress.writes)
+        r->gathered =
+            drape_arena_take(&r->arena, (size_t)r->model->node_count, (fields ? 9 : 3) * sizeof(double));
+    return drape_frames_create(&r->arena, r->model, drape_system_motion(r->sim->system), fields, bodies,
+                               rotates, &r->frames);
 }
 
 /* ---- Files ---- */
@@ -545,8 +428,8 @@ static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def
     r->def.resumes = def->archive != NULL;
     r->def.whole = &r->whole;
     r->def.growing = &r->growing;
-    r->def.bodies = r->bodies;
-    r->def.body_count = (int32_t)r->body_count;
+    r->def.bodies = r->frames.bodies;
+    r->def.body_count = r->frames.body_count;
     return DRAPE_OK;
 }
 
@@ -650,7 +533,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     scope s = scope_enter();
     drape_status status = choose_outputs(r, def);
     if (!status)
-        status = allocate_arrays(r);
+        status = allocate_frames(r);
     if (!status && r->progress.writes)
         status = open_folder(r, def);
     if (!status && a) {
