@@ -281,7 +281,7 @@ static int resume(run *r)
     size_t size;
     if (!r->request->resume)
         return CLI_GO_ON;
-    char *path = drape_record_path(ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
+    char *path = drape_disk_path(ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
     drape_status status =
         path ? drape_file_read(ctx, path, INT64_MAX, &r->checkpoint, &size) : DRAPE_E_MEMORY;
     there = !status;

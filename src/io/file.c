@@ -14,16 +14,7 @@
 #define BUFFER_SIZE 65536
 #define MAX_PRINT   1024
 #define MAX_NAME    256
-#define READ_SIZE   16384 /* bytes that are read at once for a checksum */
-
-drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error)
-{
-    char text[128];
-    if (strerror_r(error, text, sizeof text))
-        snprintf(text, sizeof text, "error %d", error);
-    return drape_fail(ctx, error == ENOMEM ? DRAPE_E_MEMORY : DRAPE_E_FILE, "cannot %s \"%.500s\": %s", deed,
-                      path, text);
-}
+#define COPY_SIZE   4096 /* bytes that are archived at once */
 
 /* The same for a file, by its whole name. */
 static drape_status fail(const drape_file *file, const char *deed, int error)
@@ -33,69 +24,6 @@ static drape_status fail(const drape_file *file, const char *deed, int error)
         return drape_file_fail(file->ctx, deed, file->path, error);
     snprintf(path, sizeof path, "%.300s/%.200s", drape_folder_path(file->folder), file->path);
     return drape_file_fail(file->ctx, deed, path, error);
-}
-
-int drape_open_regular(int dir, const char *path, int flags)
-{
-    struct stat info;
-    const int fd = openat(dir, path, flags | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd >= 0 && fstat(fd, &info) == 0 && S_ISREG(info.st_mode))
-        return fd;
-    const bool special = fd >= 0 || errno == ELOOP || errno == ENXIO || errno == EISDIR;
-    if (fd >= 0)
-        close(fd);
-    errno = special ? EINVAL : errno;
-    return -1;
-}
-
-int drape_file_open(drape_context *ctx, const char *path)
-{
-    const int fd = drape_open_regular(AT_FDCWD, path, O_RDONLY), error = errno;
-    if (fd < 0 && error != EINVAL)
-        drape_file_fail(ctx, "read", path, error);
-    else if (fd < 0)
-        drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\": it is not a regular file", path);
-    errno = error;
-    return fd;
-}
-
-int drape_read_at(int fd, void *to, size_t size, off_t offset)
-{
-    for (char *at = to; size > 0;) {
-        const ssize_t n = pread(fd, at, size, offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return n < 0 ? errno : EIO;
-        at += n;
-        offset += n;
-        size -= (size_t)n;
-    }
-    return 0;
-}
-
-drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
-                             size_t *size)
-{
-    struct stat info;
-    int error = fstat(fd, &info) ? errno : info.st_size > limit ? EFBIG : 0;
-    *size = error ? 0 : (size_t)info.st_size;
-    *bytes = error ? NULL : drape_alloc(ctx, *size + 1, 1);
-    if (*bytes)
-        error = drape_read_at(fd, *bytes, *size, 0);
-    close(fd);
-    if (!error)
-        return *bytes ? DRAPE_OK : DRAPE_E_MEMORY;
-    drape_free(ctx, *bytes);
-    *bytes = NULL;
-    return drape_file_fail(ctx, "read", path, error);
-}
-
-drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, char **bytes, size_t *size)
-{
-    const int fd = drape_file_open(ctx, path);
-    *bytes = NULL;
-    return fd < 0 ? DRAPE_E_FILE : drape_file_take(ctx, fd, path, limit, bytes, size);
 }
 
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
@@ -331,54 +259,6 @@ int64_t drape_file_end(const drape_file *file)
     return (int64_t)file->size + (int64_t)file->used;
 }
 
-/* Where declared bytes are in a file of this size. */
-static off_t place_of(const drape_file_change *c, off_t size)
-{
-    return (off_t)c->offset + (c->offset < 0 ? size : 0);
-}
-
-/* The checksum of the bytes from `begin`, a multiple of 8, to `end`, of which those in `change`
- * (DRAPE_FILE_CHANGES; NULL: none) are taken from there. 0 or errno. */
-static int sum_bytes(int fd, off_t begin, off_t end, const drape_file_change *change, drape_checksum *sum)
-{
-    unsigned char bytes[READ_SIZE];
-    *sum = (drape_checksum){.size = (uint64_t)begin};
-    for (off_t next; begin < end; begin = next) {
-        next = end - begin < READ_SIZE ? end : begin + READ_SIZE;
-        const int error = drape_read_at(fd, bytes, (size_t)(next - begin), begin);
-        if (error)
-            return error;
-        for (const drape_file_change *c = change; c && c < change + DRAPE_FILE_CHANGES; c++) {
-            const off_t at = place_of(c, end), first = at > begin ? at : begin,
-                        last = at + c->size < next ? at + (off_t)c->size : next;
-            if (first < last)
-                memcpy(bytes + (first - begin), c->bytes + (first - at), (size_t)(last - first));
-        }
-        drape_checksum_add(sum, bytes, (size_t)(next - begin));
-    }
-    return 0;
-}
-
-int drape_file_sum(int fd, off_t size, drape_checksum *sum)
-{
-    return sum_bytes(fd, 0, size, NULL, sum);
-}
-
-static int write_at(int fd, off_t offset, const void *data, size_t size)
-{
-    for (const char *from = data; size > 0;) {
-        const ssize_t n = pwrite(fd, from, size, offset);
-        if (n < 0 && errno == EINTR)
-            continue;
-        if (n <= 0)
-            return n < 0 ? errno : ENOSPC;
-        from += n;
-        offset += n;
-        size -= (size_t)n;
-    }
-    return 0;
-}
-
 /* The checksum changes by that of the words that the bytes touch. */
 void drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
 {
@@ -386,13 +266,13 @@ void drape_file_overwrite(drape_file *file, off_t offset, const void *data, size
     drape_checksum before, after;
     flush(file);
     if (!file->error)
-        file->error = sum_bytes(file->fd, begin, last < file->size ? last : file->size, NULL, &before);
+        file->error = drape_disk_sum(file->fd, begin, last < file->size ? last : file->size, NULL, &before);
     if (!file->error)
-        file->error = write_at(file->fd, offset, data, size);
+        file->error = drape_write_at(file->fd, offset, data, size);
     if (file->error)
         return;
     file->size = end > file->size ? end : file->size;
-    file->error = sum_bytes(file->fd, begin, last < file->size ? last : file->size, NULL, &after);
+    file->error = drape_disk_sum(file->fd, begin, last < file->size ? last : file->size, NULL, &after);
     file->sum.sum += after.sum - before.sum;
     if (last >= file->size) {
         file->sum.size = after.size;
@@ -409,11 +289,11 @@ void drape_file_overwrite_word(drape_file *file, off_t offset, uint32_t word)
 
 void drape_file_declare(drape_file *file, int64_t offset, size_t size)
 {
-    drape_file_change *c = file->change;
+    drape_disk_bytes *c = file->change;
     while (c->size > 0)
         c++;
-    assert(c < file->change + DRAPE_FILE_CHANGES);
-    *c = (drape_file_change){.offset = offset, .size = (int64_t)size};
+    assert(c < file->change + DRAPE_DISK_BYTES);
+    *c = (drape_disk_bytes){.offset = offset, .size = (int64_t)size};
 }
 
 /* ---- Ending ---- */
@@ -450,23 +330,13 @@ drape_status drape_file_publish(drape_file *file)
     return status;
 }
 
-/* 0 or errno. A file that cannot be synced, such as a pipe, has no disk to wait for. */
-static int sync_descriptor(int fd)
-{
-    int code;
-    do
-        code = fsync(fd);
-    while (code && errno == EINTR);
-    return code && errno != EINVAL && errno != ENOTSUP ? errno : 0;
-}
-
 /* Closes the file before the rename: some file systems report a full disk only on closing. */
 drape_status drape_file_finish(drape_file *file)
 {
     struct stat info;
     flush(file);
     if (file->durable && !file->error)
-        file->error = sync_descriptor(file->fd);
+        file->error = drape_disk_sync(file->fd);
     const bool known = fstat(file->fd, &info) == 0;
     const int closing = close_descriptor(file), error = file->error ? file->error : closing;
     if (error)
@@ -489,25 +359,15 @@ drape_status drape_file_keep(drape_file *file)
     }
     if (ftruncate(file->fd, file->kept) == 0) {
         file->size = file->kept;
-        drape_file_sum(file->fd, file->size, &file->sum);
+        drape_disk_sum(file->fd, 0, file->size, NULL, &file->sum);
     }
     return fail(file, "write", error);
 }
 
 drape_status drape_file_sync(drape_file *file)
 {
-    int error = file->open ? sync_descriptor(file->fd) : 0;
+    int error = file->open ? drape_disk_sync(file->fd) : 0;
     return error ? fail(file, "write", error) : DRAPE_OK;
-}
-
-/* Opens the folder that a path leads into. Returns -1 with errno. */
-static int open_parent(const char *path)
-{
-    char parent[4096];
-    const char *slash = strrchr(path, '/');
-    const int length = slash ? (int)(slash - path) : 0;
-    snprintf(parent, sizeof parent, "%.*s%s", length, path, slash ? "/" : ".");
-    return open(parent, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
 /* A folder may be writable without being readable. */
@@ -515,21 +375,11 @@ drape_status drape_file_sync_names(drape_file *file)
 {
     if (file->folder)
         return drape_folder_sync(file->folder);
-    const int fd = open_parent(file->path);
-    int error = fd < 0 ? errno : sync_descriptor(fd);
+    const int fd = drape_disk_open_parent(file->path);
+    int error = fd < 0 ? errno : drape_disk_sync(fd);
     if (fd >= 0)
         close(fd);
     return error && error != EACCES ? fail(file, "write the folder of", error) : DRAPE_OK;
-}
-
-bool drape_folder_has(const char *folder, const char *path)
-{
-    struct stat a, b;
-    const int fd = open_parent(path);
-    const bool known = fd >= 0 && stat(folder, &a) == 0 && fstat(fd, &b) == 0;
-    if (fd >= 0)
-        close(fd);
-    return known && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
 }
 
 /* ---- Resuming ---- */
@@ -539,18 +389,19 @@ void drape_file_archive(drape_file *file, drape_archive *a)
     int64_t kept = file->kept, sum = (int64_t)file->sum.sum;
     drape_archive_int64(a, &kept);
     drape_archive_int64(a, &sum);
-    for (drape_file_change *c = file->change; c < file->change + DRAPE_FILE_CHANGES; c++) {
+    for (drape_disk_bytes *c = file->change; c < file->change + DRAPE_DISK_BYTES; c++) {
         drape_archive_int64(a, &c->offset);
         drape_archive_int64(a, &c->size);
         if (drape_archive_has_read(a)) {
-            if (c->size < 0 || c->size > kept || c->offset < -kept || place_of(c, kept) > kept - c->size)
+            if (c->size < 0 || c->size > kept || c->offset < -kept ||
+                drape_disk_place(c, kept) > kept - c->size)
                 drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint overwrites bytes beyond a file");
             c->bytes = drape_archive_next(a, (size_t)c->size);
         }
         for (int64_t done = 0; !a->reading && done < c->size && !a->status;) {
-            unsigned char bytes[READ_SIZE];
-            const size_t n = c->size - done < READ_SIZE ? (size_t)(c->size - done) : READ_SIZE;
-            const int error = drape_read_at(file->fd, bytes, n, place_of(c, kept) + (off_t)done);
+            unsigned char bytes[COPY_SIZE];
+            const size_t n = c->size - done < COPY_SIZE ? (size_t)(c->size - done) : COPY_SIZE;
+            const int error = drape_read_at(file->fd, bytes, n, drape_disk_place(c, kept) + (off_t)done);
             if (error)
                 drape_archive_note(a, fail(file, "read", error));
             drape_archive_bytes(a, bytes, n);
@@ -577,7 +428,7 @@ drape_status drape_file_reopen(drape_file *file)
             file->ctx, DRAPE_E_FILE,
             "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint", folder,
             file->path, (long long)file->last.st_size, (long long)file->kept);
-    const int error = sum_bytes(file->fd, 0, file->kept, file->change, &file->sum);
+    const int error = drape_disk_sum(file->fd, 0, file->kept, file->change, &file->sum);
     if (error)
         return fail(file, "continue", error);
     return file->sum.sum == expected
@@ -592,8 +443,8 @@ drape_status drape_file_trim(drape_file *file)
 {
     drape_status status = drape_folder_note(file->folder, file->path, NULL, file->fd, file->durable);
     int error = 0;
-    for (drape_file_change *c = file->change; c < file->change + DRAPE_FILE_CHANGES && !status && !error; c++)
-        error = write_at(file->fd, place_of(c, file->kept), c->bytes, (size_t)c->size);
+    for (drape_disk_bytes *c = file->change; c < file->change + DRAPE_DISK_BYTES && !status && !error; c++)
+        error = drape_write_at(file->fd, drape_disk_place(c, file->kept), c->bytes, (size_t)c->size);
     if (!status && !error && ftruncate(file->fd, file->kept))
         error = errno;
     return error ? fail(file, "continue", error) : status;
@@ -609,31 +460,4 @@ drape_status drape_file_close(drape_file *file)
     if (error)
         return fail(file, "close", error);
     return published ? drape_folder_note(file->folder, file->path, &file->sum, -1, file->durable) : DRAPE_OK;
-}
-
-/* ---- Folders ---- */
-
-/* 0 or errno. An existing folder is a success whatever error mkdir reports, such as EROFS. */
-static int make_one(const char *path)
-{
-    struct stat info;
-    if (mkdir(path, (mode_t)0777) == 0)
-        return 0;
-    int error = errno;
-    if (stat(path, &info))
-        return error;
-    return S_ISDIR(info.st_mode) ? 0 : ENOTDIR;
-}
-
-drape_status drape_folder_make(drape_context *ctx, char *path)
-{
-    int error = 0;
-    for (char *slash = strchr(path + 1, '/'); slash && !error; slash = strchr(slash + 1, '/')) {
-        *slash = 0;
-        error = make_one(path);
-        *slash = '/';
-    }
-    if (!error)
-        error = make_one(path);
-    return error ? drape_file_fail(ctx, "make the folder", path, error) : DRAPE_OK;
 }

@@ -18,20 +18,11 @@
 #include <sys/stat.h>
 
 #include "base/archive.h"
-#include "base/checksum.h"
-#include "base/context.h"
 #include "io/folder.h"
 
 #define DRAPE_FILE_PART    ".part"          /* suffix of temporary names */
 #define DRAPE_MAX_TABLE    ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
 #define DRAPE_FILE_CHANGES 3
-
-/* Bytes of a growing file that later records overwrite. */
-typedef struct drape_file_change {
-    int64_t offset;             /* < 0: counted from the end of the last complete record */
-    int64_t size;               /* 0: unused */
-    const unsigned char *bytes; /* while a run is resumed: what a checkpoint says they were */
-} drape_file_change;
 
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
@@ -47,9 +38,10 @@ typedef struct drape_file {
     int error;          /* errno of the first failure since the last record; 0: none */
     off_t size, kept;   /* bytes written; bytes of complete records */
     drape_checksum sum; /* of the bytes written */
-    drape_file_change change[DRAPE_FILE_CHANGES];
-    struct stat last;        /* the file that was last published; st_ino 0: none */
-    struct drape_file *next; /* growing file of the same run; NULL: there are no more */
+    drape_disk_bytes
+        change[DRAPE_DISK_BYTES]; /* what later records overwrite; offset < 0: counted from the end */
+    struct stat last;             /* the file that was last published; st_ino 0: none */
+    struct drape_file *next;      /* growing file of the same run; NULL: there are no more */
 } drape_file;
 
 /* Takes all memory for files that the user names, with paths of at most path_length bytes; or for the file of
@@ -131,37 +123,5 @@ drape_status drape_file_reopen(drape_file *file);
 
 /* Makes the reopened file what it was when it was archived, to be continued. Errors: DRAPE_E_FILE. */
 drape_status drape_file_trim(drape_file *file);
-
-/* The checksum of the first bytes of a file. Returns 0 or an errno. */
-int drape_file_sum(int fd, off_t size, drape_checksum *sum);
-
-/* ---- Reading, and folders ---- */
-
-/* Sets the message `cannot DEED "PATH": strerror(error)`. Returns DRAPE_E_FILE; for ENOMEM DRAPE_E_MEMORY. */
-drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error);
-
-/* Opens a regular file below the folder `dir`, a descriptor or AT_FDCWD. Returns -1 with errno, which is
- * EINVAL for anything else, such as a pipe or a device: opening it does not wait. */
-int drape_open_regular(int dir, const char *path, int flags);
-
-/* Reads bytes from an offset on; 0 or errno, which is EIO if the file ends before. */
-int drape_read_at(int fd, void *to, size_t size, off_t offset);
-
-/* Opens a file of a run or an experiment for reading, as all readers do; a failure also sets the message. */
-int drape_file_open(drape_context *ctx, const char *path);
-
-/* Reads all of such a file, of at most `limit` bytes, and a 0 after it; *bytes, for drape_free, is NULL after
- * a failure. drape_file_take: from a descriptor, which it closes. Errors: DRAPE_E_FILE,
- * DRAPE_E_MEMORY. */
-drape_status drape_file_read(drape_context *ctx, const char *path, off_t limit, char **bytes, size_t *size);
-drape_status drape_file_take(drape_context *ctx, int fd, const char *path, off_t limit, char **bytes,
-                             size_t *size);
-
-/* Whether a file at path is directly in a folder. */
-bool drape_folder_has(const char *folder, const char *path);
-
-/* Creates a folder and its missing parents, with the mode 0777 & ~umask. path is modified during the call.
- * Errors: DRAPE_E_FILE. */
-drape_status drape_folder_make(drape_context *ctx, char *path);
 
 #endif

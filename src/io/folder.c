@@ -14,7 +14,6 @@
 
 #include "base/arena.h"
 #include "base/json_read.h"
-#include "io/file.h"
 
 #define VALUES_SIZE  80                           /* for the values of a line */
 #define LINE_SIZE    (20 + 6 * 255 + VALUES_SIZE) /* a name of 255 bytes, each escaped, and its values */
@@ -227,7 +226,7 @@ static bool is_described(const json_t *lines, int fd, const struct stat *info)
         complete = true;
         if (number_of(line, "size") != (uint64_t)info->st_size)
             continue;
-        if (content.size == 0 && drape_file_sum(fd, info->st_size, &content))
+        if (content.size == 0 && drape_disk_sum(fd, 0, info->st_size, NULL, &content))
             return false;
         if (number_of(line, "checksum") == content.sum)
             return true;

@@ -17,13 +17,11 @@
 #ifndef DRAPE_IO_FOLDER_H
 #define DRAPE_IO_FOLDER_H
 
-#include <sys/stat.h>
-
-#include "base/checksum.h"
-#include "base/context.h"
+#include "io/disk.h"
 
 #define DRAPE_MANIFEST_NAME "manifest.jsonl"
-#define DRAPE_PART_SIZE     64 /* for a temporary name */
+#define DRAPE_FILE_PART     ".part" /* suffix of temporary names */
+#define DRAPE_PART_SIZE     64      /* for a temporary name */
 
 typedef struct drape_folder drape_folder;
 

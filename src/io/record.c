@@ -14,20 +14,9 @@
 #include "io/npy.h"
 #include "io/scene_copy.h"
 
-/* ---- Names ---- */
-
-char *drape_record_path(drape_context *ctx, const char *folder, const char *name)
-{
-    size_t size = strlen(folder) + strlen(name) + 2;
-    char *path = drape_alloc(ctx, size, 1);
-    if (path)
-        snprintf(path, size, "%s/%s", folder, name);
-    return path;
-}
-
 drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path)
 {
-    *path = drape_record_path(ctx, folder, DRAPE_SCENE_COPY);
+    *path = drape_disk_path(ctx, folder, DRAPE_SCENE_COPY);
     if (!*path)
         return DRAPE_E_MEMORY;
     struct stat info;
@@ -126,7 +115,7 @@ static char *next_line(char **rest)
 drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
                                size_t count, drape_row_reader *reader, void *user, int64_t *rows)
 {
-    char *path = drape_record_path(run->ctx, run->folder, name), *text;
+    char *path = drape_disk_path(run->ctx, run->folder, name), *text;
     char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
     size_t size, place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
     if (!path)
@@ -173,7 +162,7 @@ drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t n
         return DRAPE_E_MEMORY;
     for (size_t n = strlen(run->folder); n > 1 && run->folder[n - 1] == '/'; n--)
         run->folder[n - 1] = 0;
-    char *path = drape_record_path(ctx, run->folder, "positions.npy");
+    char *path = drape_disk_path(ctx, run->folder, "positions.npy");
     drape_status status = path ? open_positions(run, path) : DRAPE_E_MEMORY;
     drape_free(ctx, path);
     if (status)

@@ -19,9 +19,6 @@ typedef struct drape_record {
  * DRAPE_E_FILE (there is no scene: the folder is not that of a run), DRAPE_E_MEMORY. */
 drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path);
 
-/* folder/name, to be freed by drape_free; NULL: out of memory. */
-char *drape_record_path(drape_context *ctx, const char *folder, const char *name);
-
 /* Opens the frames of a run whose scene has so many nodes, and reads their times. Call drape_record_close
  * in any case. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (not an array as drape run writes it, another number of
  * nodes, truncated), DRAPE_E_MEMORY. */

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "base/param.h"
-#include "io/record.h"
+#include "io/file.h"
 #include "model/scene_text.h"
 
 #define MESH_NAME    "scene_mesh_%d%s"
@@ -109,7 +109,7 @@ static drape_status copy_file(void *user, const char *source, const char *pointe
         char folder[PATH_MAX];
         if (*source == '/' || !getcwd(folder, sizeof folder))
             return DRAPE_OK;
-        char *whole = drape_record_path(c->ctx, folder, source);
+        char *whole = drape_disk_path(c->ctx, folder, source);
         const drape_status kept = whole ? drape_scene_set(c->scene, pointer, whole) : DRAPE_E_MEMORY;
         drape_free(c->ctx, whole);
         return kept;

@@ -87,7 +87,7 @@ static drape_status read_run(page *p, const char *folder)
     drape_free(ctx, scene);
     if (!status)
         status = drape_record_open(ctx, folder, p->model->node_count, &p->record);
-    char *path = status ? NULL : drape_record_path(ctx, folder, DRAPE_SUMMARY_NAME);
+    char *path = status ? NULL : drape_disk_path(ctx, folder, DRAPE_SUMMARY_NAME);
     if (status || !path)
         return status ? status : DRAPE_E_MEMORY;
     const int fd = drape_file_open(ctx, path);
