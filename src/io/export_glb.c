@@ -172,32 +172,6 @@ static void find_bounds(const float *value, size_t stride, size_t count, float b
 
 /* ---- Vertices and primitives ---- */
 
-static const char *material_of(const drape_faces *faces, int32_t face)
-{
-    return faces->count > 0 && faces->material[face] >= 0 ? faces->name[faces->material[face]] : "";
-}
-
-static uint32_t triangles_of(const drape_faces *faces, int32_t face)
-{
-    return faces->count > 0 ? (uint32_t)(faces->first[face + 1] - faces->first[face] - 2) : 1;
-}
-
-static int32_t face_count(const drape_mesh *mesh)
-{
-    return mesh->faces.count > 0 ? mesh->faces.count : mesh->triangle_count;
-}
-
-static int compare_names(const void *left, const void *right)
-{
-    return strcmp(((const primitive *)left)->name, ((const primitive *)right)->name);
-}
-
-static primitive *find_primitive(const glb_state *glb, const char *name)
-{
-    return bsearch(&(primitive){.name = name}, glb->primitive, glb->primitives, sizeof *glb->primitive,
-                   compare_names);
-}
-
 /* A text of JSON; quotes around it. */
 static char *quote(drape_arena *arena, const char *name)
 {
@@ -211,39 +185,57 @@ static char *quote(drape_arena *arena, const char *name)
     return out;
 }
 
+/* The triangles of a mesh whose faces have this material (-1: none), and the vertices at their corners.
+ * Returns their number. at: the vertex at each corner of a triangle of the mesh; NULL: they are counted. */
+static uint32_t find_triangles(const drape_mesh *mesh, int32_t material, const int32_t *at,
+                               uint32_t first_vertex, uint32_t *corner)
+{
+    const drape_faces *faces = &mesh->faces;
+    const int32_t face_count = faces->count > 0 ? faces->count : mesh->triangle_count;
+    uint32_t found = 0, passed = 0;
+    for (int32_t f = 0; f < face_count; f++) {
+        const uint32_t n = faces->count > 0 ? (uint32_t)(faces->first[f + 1] - faces->first[f] - 2) : 1;
+        const bool has = (faces->count > 0 ? faces->material[f] : -1) == material;
+        for (uint32_t k = 0; at && has && k < 3 * n; k++)
+            corner[3 * found + k] = first_vertex + (uint32_t)at[3 * passed + k];
+        found += has ? n : 0;
+        passed += n;
+    }
+    return found;
+}
+
+/* The primitive of a material of a mesh, which is made if there is none of its name. */
+static primitive *primitive_of(glb_state *glb, const drape_faces *faces, int32_t material)
+{
+    const char *name = material < 0 ? "" : faces->name[material];
+    for (uint32_t i = 0; i < glb->primitives; i++)
+        if (strcmp(glb->primitive[i].name, name) == 0)
+            return &glb->primitive[i];
+    glb->primitive[glb->primitives].name = name;
+    return &glb->primitive[glb->primitives++];
+}
+
+static int compare_names(const void *left, const void *right)
+{
+    return strcmp(((const primitive *)left)->name, ((const primitive *)right)->name);
+}
+
 /* One for each name that triangles have, in the order of the names. */
 static drape_status make_primitives(glb_state *glb)
 {
     const drape_render_surface *surface = &glb->def->model->surface;
-    drape_arena *arena = glb->def->arena;
-    size_t count = 0, listed = 1;
-    for (int32_t c = 0; c < surface->cloth_count; c++)
-        count += (size_t)surface->cloths[c].mesh->faces.material_count;
-    glb->primitive = drape_arena_take(arena, count + 1 + (size_t)glb->def->body_count, sizeof(primitive));
-    if (!glb->primitive)
-        return DRAPE_E_MEMORY;
-    glb->primitive[0].name = "";
-    for (int32_t c = 0; c < surface->cloth_count; c++)
-        for (int32_t m = 0; m < surface->cloths[c].mesh->faces.material_count; m++)
-            glb->primitive[listed++].name = surface->cloths[c].mesh->faces.name[m];
-    qsort(glb->primitive, listed, sizeof *glb->primitive, compare_names);
-    for (size_t i = 0; i < listed; i++) /* each name once */
-        if (i == 0 || compare_names(&glb->primitive[glb->primitives - 1], &glb->primitive[i]) != 0)
-            glb->primitive[glb->primitives++].name = glb->primitive[i].name;
-    for (int32_t c = 0; c < surface->cloth_count; c++)
-        for (int32_t f = 0; f < face_count(surface->cloths[c].mesh); f++) {
-            const drape_faces *faces = &surface->cloths[c].mesh->faces;
-            find_primitive(glb, material_of(faces, f))->count += triangles_of(faces, f);
+    for (int32_t c = 0; c < surface->cloth_count; c++) {
+        const drape_mesh *mesh = surface->cloths[c].mesh;
+        for (int32_t m = -1; m < mesh->faces.material_count; m++) {
+            const uint32_t count = find_triangles(mesh, m, NULL, 0, NULL);
+            if (count > 0)
+                primitive_of(glb, &mesh->faces, m)->count += count;
         }
-    listed = glb->primitives;
-    glb->primitives = 0;
-    for (size_t i = 0; i < listed; i++) {
-        if (glb->primitive[i].count == 0)
-            continue;
-        primitive *p = &glb->primitive[glb->primitives++];
-        *p = glb->primitive[i];
+    }
+    qsort(glb->primitive, glb->primitives, sizeof *glb->primitive, compare_names);
+    for (primitive *p = glb->primitive; p < glb->primitive + glb->primitives; p++) {
         p->first = glb->triangles;
-        p->quoted = quote(arena, *p->name ? p->name : DRAPE_NO_MATERIAL);
+        p->quoted = quote(glb->def->arena, *p->name ? p->name : DRAPE_NO_MATERIAL);
         if (!p->quoted)
             return DRAPE_E_MEMORY;
         glb->triangles += p->count;
@@ -255,51 +247,52 @@ static drape_status make_primitives(glb_state *glb)
 static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth)
 {
     const drape_faces *faces = &cloth->mesh->faces;
-    drape_arena scratch = drape_arena_of(glb->def->arena->ctx);
+    drape_arena scratch = drape_arena_of(glb->def->ctx);
     drape_vertices vertices;
     const drape_status status = drape_faces_vertices(&scratch, cloth->mesh, &vertices);
-    const int32_t *at = vertices.at;
     for (int32_t i = 0; !status && i < vertices.count; i++) {
         const size_t to = (size_t)glb->vertices + (size_t)i;
         glb->node[to] = cloth->first_node + vertices.node[i];
         if (glb->uv)
             glb->uv[to] = vertices.uv[i] < 0 ? NULL : faces->uv + 2 * (size_t)vertices.uv[i];
     }
-    for (int32_t f = 0; !status && f < face_count(cloth->mesh); f++) {
-        primitive *p = find_primitive(glb, material_of(faces, f));
-        uint32_t *corner = glb->corner + 3 * ((size_t)p->first + p->filled);
-        p->filled += triangles_of(faces, f);
-        for (uint32_t k = 0; k < 3 * triangles_of(faces, f); k++)
-            *corner++ = glb->vertices + (uint32_t)*at++;
+    for (int32_t m = -1; !status && m < faces->material_count; m++) {
+        if (find_triangles(cloth->mesh, m, NULL, 0, NULL) == 0)
+            continue;
+        primitive *p = primitive_of(glb, faces, m);
+        p->filled += find_triangles(cloth->mesh, m, vertices.at, glb->vertices,
+                                    glb->corner + 3 * ((size_t)p->first + p->filled));
     }
     glb->vertices += status ? 0 : (uint32_t)vertices.count;
     drape_arena_free(&scratch);
     return status;
 }
 
-static drape_status add_cloths(glb_state *glb)
+/* The memory of vertices, triangles, primitives and objects. */
+static drape_status take_arrays(glb_state *glb)
 {
-    const drape_render_surface *surface = &glb->def->model->surface;
     const drape_export_def *def = glb->def;
-    size_t own = 0, room = 0, triangles = (size_t)surface->triangle_count;
+    const drape_render_surface *surface = &def->model->surface;
+    size_t nodes = 0, points = 0, primitives = 1, triangles = (size_t)surface->triangle_count;
     bool has_uvs = false;
     for (int32_t c = 0; c < surface->cloth_count; c++) {
         const drape_mesh *mesh = surface->cloths[c].mesh;
         has_uvs = has_uvs || mesh->faces.uv_count > 0;
-        own += (size_t)(mesh->faces.uv_count > 0 ? 3 * mesh->triangle_count : mesh->node_count);
+        nodes += (size_t)(mesh->faces.uv_count > 0 ? 3 * mesh->triangle_count : mesh->node_count);
+        primitives += (size_t)mesh->faces.material_count;
     }
     for (int32_t b = 0; b < def->body_count; b++) {
         triangles += (size_t)def->bodies[b].triangle_count;
-        room += def->bodies[b].deforms ? (size_t)def->bodies[b].vertex_count : 0;
+        points += def->bodies[b].deforms ? (size_t)def->bodies[b].vertex_count : 0;
     }
+    glb->primitive =
+        drape_arena_take(def->arena, primitives + (size_t)def->body_count, sizeof *glb->primitive);
+    glb->object = drape_arena_take(def->arena, (size_t)def->body_count + 1, sizeof *glb->object);
     glb->corner = drape_arena_take(def->arena, triangles, 3 * sizeof *glb->corner);
-    glb->node = drape_arena_take(def->arena, own + room, sizeof *glb->node);
+    glb->node = drape_arena_take(def->arena, nodes + points, sizeof *glb->node);
     if (has_uvs)
-        glb->uv = drape_arena_take(def->arena, own, sizeof *glb->uv);
-    drape_status status = drape_arena_status(def->arena);
-    for (int32_t c = 0; !status && c < surface->cloth_count; c++)
-        status = add_cloth(glb, &surface->cloths[c]);
-    return status;
+        glb->uv = drape_arena_take(def->arena, nodes, sizeof *glb->uv);
+    return drape_arena_status(def->arena);
 }
 
 /* Those that deform come before the rigid ones. */
@@ -334,16 +327,15 @@ static void add_bodies(glb_state *glb, bool rigid)
 
 static drape_status make_objects(glb_state *glb)
 {
-    drape_arena *arena = glb->def->arena;
-    drape_status status = make_primitives(glb);
+    const drape_render_surface *surface = &glb->def->model->surface;
+    drape_status status = take_arrays(glb);
     if (!status)
-        status = add_cloths(glb);
+        status = make_primitives(glb);
+    for (int32_t c = 0; !status && c < surface->cloth_count; c++)
+        status = add_cloth(glb, &surface->cloths[c]);
     if (status)
         return status;
-    glb->object = drape_arena_take(arena, (size_t)glb->def->body_count + 1, sizeof *glb->object);
-    if (!glb->object)
-        return DRAPE_E_MEMORY;
-    glb->points = (uint32_t)glb->def->model->surface.node_count;
+    glb->points = (uint32_t)surface->node_count;
     glb->objects = 1;
     glb->object[0] =
         (object){.vertices = glb->vertices, .points = glb->points, .primitives = glb->primitives};
@@ -351,7 +343,7 @@ static drape_status make_objects(glb_state *glb)
     glb->deforming = glb->objects;
     add_bodies(glb, true);
     for (uint32_t i = 0; i < glb->objects; i++) {
-        glb->object[i].name = quote(arena, i ? glb->object[i].body->name : "cloth");
+        glb->object[i].name = quote(glb->def->arena, i ? glb->object[i].body->name : "cloth");
         if (!glb->object[i].name)
             return DRAPE_E_MEMORY;
     }
@@ -359,7 +351,7 @@ static drape_status make_objects(glb_state *glb)
     glb->rigid_bytes = 24 * glb->rigid_vertices;
     glb->fixed_bytes = 12 * glb->triangles + glb->uv_bytes + glb->rigid_bytes;
     glb->frame_bytes = 24 * glb->vertices;
-    return drape_arena_status(arena);
+    return drape_arena_status(glb->def->arena);
 }
 
 /* ---- JSON ---- */
