@@ -107,20 +107,20 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
 int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 
-/* A text of the user's as it may be printed, shortened to 255 bytes, or as the room has it: in printf("%s",
- * CLI_SHOWN(name)). */
+/* A text of the user, such as a name, as it may be printed: shortened to 255 bytes, or to the given size. To
+ * be used as in printf("%s", CLI_SHOWN(name)). */
 #define CLI_SHOWN(text) cli_shown((char[256]){0}, 256, text)
-const char *cli_shown(char *room, size_t size, const char *text);
+const char *cli_shown(char *out, size_t size, const char *text);
 
 /* Prints a message of the library on stderr: as it is if it begins with an operand, as
  * "scene.json:6:26: /cloth/0: text" does, else behind "drape VERB: ". */
 void cli_print_message(const cli_command *command, const char *message);
 
-/* Prints the message of the command's context so. Returns the exit code that it is given, but CLI_FAILED if
- * memory ran out: the input may be good. */
+/* Prints the message of the command's context by cli_print_message. Returns the given exit code, but
+ * CLI_FAILED if memory ran out: the input may be good. */
 int cli_report(const cli_command *command, int code);
 
-/* The same for memory that ran out without a message. */
+/* Reports that memory ran out where no message says so. Returns CLI_FAILED. */
 int cli_report_memory(const cli_command *command);
 
 /* Prints a value, whose reference it takes over: all of it or a message. The caller has set errno to 0 before
@@ -186,7 +186,7 @@ typedef struct cli_scene {
  * cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out);
 
-/* The same; `choose` may change the scene and how the sim will run, once the scene is compiled. */
+/* The same; once the scene is compiled, `choose` may change it, and how the sim will run. */
 typedef drape_status cli_choose(void *user, const cli_scene *scene, drape_sim_def *def);
 int cli_scene_load_with(const cli_command *command, const char *path, cli_choose *choose, void *user,
                         cli_scene *out);

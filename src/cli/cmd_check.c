@@ -1,5 +1,5 @@
-/* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences; or counts what
- * passes through what in the frames of a run. */
+/* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences; or counts the
+ * intersections of cloth with itself and with colliders in the frames of a run. */
 #include "cli/cli.h"
 
 #include "assemble/check.h"
@@ -60,7 +60,7 @@ static int check(const check_request *request, const cli_scene *in)
 
 /* ---- The frames of a run ---- */
 
-/* Adds to the sum what passes through what, and finds the deepest point inside [m]. */
+/* Adds the intersections of a frame to the sum, and finds the deepest point inside a collider [m]. */
 static drape_status check_collider(const cli_scene *in, int32_t collider, int64_t frame, double time,
                                    const double *x, int64_t *sum, double *deepest)
 {

@@ -12,8 +12,8 @@ typedef struct ivp_request {
 
 #define SECONDS 60 /* [s] CPU that a family of methods may take for a reference */
 
-/* What is done with one scene; the operand after it, if there is one. */
-typedef drape_status ivp_deed(lab_ivp *s, const ivp_request *request, const char *more, bool *good);
+/* An action with one scene. more: the operand after it, if there is one. */
+typedef drape_status ivp_action(lab_ivp *s, const ivp_request *request, const char *more, bool *good);
 
 static drape_status horizon(lab_ivp *s, const ivp_request *request, const char *more, bool *good)
 {
@@ -44,7 +44,7 @@ static drape_status export(lab_ivp *s, const ivp_request *request, const char *m
 
 static const struct {
     const char *name;
-    ivp_deed *deed;
+    ivp_action *perform;
     int operands; /* with a scene; 0: any number of scenes */
     const char *usage;
 } actions[] = {
@@ -56,8 +56,8 @@ static const struct {
 };
 #define ACTIONS (sizeof actions / sizeof *actions)
 
-/* Does the deed with each scene. Failures of a scene, of a file that is read and of the output folder are bad
- * input. */
+/* Carries out the action with each scene. Failures of a scene, of a file that is read and of the output
+ * folder are bad input. */
 static int do_scenes(const ivp_request *request, size_t action)
 {
     const cli_command *command = &request->lab.command;
@@ -73,7 +73,7 @@ static int do_scenes(const ivp_request *request, size_t action)
         drape_status status = lab_ivp_open(&arena, command->operands[i], &s);
         s.def.cancel = cli_interrupted_by;
         if (!status)
-            status = actions[action].deed(&s, request, more, &good);
+            status = actions[action].perform(&s, request, more, &good);
         lab_ivp_close(&s);
         fflush(stdout);
         int code = good ? CLI_DONE : CLI_FAILED;
@@ -102,11 +102,11 @@ static int run(const void *given)
     const int given_operands = command->operand_count - 1;
     if (given_operands < 1 || (actions[i].operands && given_operands != actions[i].operands))
         return cli_misuse("ivp", "usage: drape ivp %s", actions[i].usage);
-    if (request->json && actions[i].deed != score)
+    if (request->json && actions[i].perform != score)
         return cli_misuse("ivp", "--json has no effect: only score prints JSON");
-    if (actions[i].deed == export && !request->lab.out)
+    if (actions[i].perform == export && !request->lab.out)
         return cli_misuse("ivp", "--out is missing: the folder of the export");
-    if (actions[i].deed)
+    if (actions[i].perform)
         return do_scenes(request, i);
     cli_lab_request lab = request->lab; /* the methods over the scenes */
     lab.command.operands++;

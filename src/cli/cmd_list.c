@@ -39,7 +39,7 @@ typedef struct cli_object {
     char pointer[64]; /* "/cloth/N/mesh"; "" for the scene itself */
 } cli_object;
 
-/* How a table is printed; NULL: nothing is. */
+/* How a table is printed; a function that is NULL prints nothing. */
 typedef struct list_style {
     const char *scene; /* before its keys */
     void (*object)(const cli_object *object);
@@ -71,7 +71,7 @@ static param_text text_of(const drape_param *param)
     return text;
 }
 
-/* Of keys of which exactly one is given, none has a default. */
+/* A key of which, with others, exactly one is given has no default. */
 static param_text text_of_key(const cli_object *object, const drape_scene_key *key)
 {
     param_text text = text_of(&key->param);
@@ -84,7 +84,7 @@ static param_text text_of_key(const cli_object *object, const drape_scene_key *k
     return text;
 }
 
-/* ---- What there is ---- */
+/* ---- The tables and the objects of a scene ---- */
 
 /* Adds an object and those inside it, in the order of their keys. Returns how many there are then. */
 static int add_objects(cli_object *objects, int count, const drape_scene_object *form, const char *pointer)
@@ -295,7 +295,7 @@ static void markdown_table(const drape_registry *table)
         printf("\nWhere: %s.\n", table->place);
 }
 
-/* What has its keys at one place of the scene needs no table of names. */
+/* Entries whose keys stand at one place of the scene need no table of names. */
 static void markdown_entries_begin(const drape_registry *table)
 {
     if (table->entries[1])
@@ -304,7 +304,7 @@ static void markdown_entries_begin(const drape_registry *table)
         printf("\n`%s`: %s.\n", table->entries[0]->name, table->entries[0]->summary);
 }
 
-/* One line for all entries of which the same is said, at the first of them. */
+/* One line for all entries that have the same description, at the first of them. */
 static void markdown_entry(const drape_registry *table, const char *only, int at)
 {
     const drape_entry *entry = table->entries[at];

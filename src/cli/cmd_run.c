@@ -56,7 +56,7 @@ typedef struct run {
     double wall;                      /* duration of the run [s] */
     const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
     int warned_count;
-    bool uncounted; /* what passes through what at the end was not counted */
+    bool uncounted; /* the intersections at the end were not counted */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -132,11 +132,11 @@ static drape_status choose_method(realtime *r, const cli_scene *scene, drape_sim
     return drape_scene_set(scene->scene, "/integrator/iterations", text);
 }
 
-/* A cli_choose. Unless the scene or the command line names a method, chooses newton_k, with as many
- * iterations as a few trial steps show to fit into half of a frame, and as many threads as the machine has
- * processors and the mesh thousands of nodes for, unless they are given. The method is set in the scene, too,
- * so that its copy runs again alike. An option that only some methods have stands for the scene's own, as one
- * that is named does. */
+/* A cli_choose for --realtime. Unless the scene or the command line names a method, it chooses newton_k.
+ * Unless they are given, it chooses as many iterations as, by a few trial steps, fit into half of a frame,
+ * and as many threads as the machine has processors and the mesh has thousands of nodes. The method is set in
+ * the scene, too, so that the copy of the scene runs again alike. An option that only some methods have
+ * counts as naming the method of the scene. */
 static drape_status choose_realtime(void *user, const cli_scene *scene, drape_sim_def *def)
 {
     realtime *r = user;
@@ -355,10 +355,10 @@ static void write_summary(run *r, drape_folder *folder, const char *path)
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
 }
 
-/* When a run is resumed, the recorder and the copy of the scene exist already; its old summary is removed, as
- * that of an earlier run is when a run starts, since a killed run must not leave it. A folder that would lose
- * a file of somebody else's is refused as bad input, before anything is touched. A folder that cannot be
- * written is the failure of the run. */
+/* Makes the recorder and the copy of the scene, unless the run is resumed, which has them already. The old
+ * summary is removed, since a killed run must not leave it. A folder in which a file of somebody else would
+ * be replaced is refused as bad input, before anything is changed; a folder that cannot be written is a
+ * failure of the run. */
 static int open_output(run *r)
 {
     const cli_command *command = &r->request->command;
@@ -436,7 +436,7 @@ static void print_inside(run *r)
                    faces == 1 ? "" : "s", faces == 1 ? "es" : "", CLI_SHOWN(r->in.model->colliders[c].name),
                    deepest);
     const int64_t edges = drape_sim_intersections(r->in.sim, -1);
-    r->uncounted = edges < 0; /* also where what is inside was not: a request to stop stays */
+    r->uncounted = edges < 0; /* if the count above was cancelled, this one is, too */
     if (edges > 0)
         printf("crossed   %lld edge-face intersection%s of the cloth with itself\n", (long long)edges,
                edges == 1 ? "" : "s");

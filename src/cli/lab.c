@@ -65,9 +65,9 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     const cli_command *command = &request->command;
     const char *slash = strrchr(command->operand, '/'), *name = slash ? slash + 1 : command->operand,
                *dot = strrchr(name, '.');
-    const size_t room = strlen(name) + strlen(command->verb) + 2;
+    const size_t size = strlen(name) + strlen(command->verb) + 2;
     const char **integrators = NULL, **results = NULL;
-    char *folder = drape_arena_take(arena, room, 1);
+    char *folder = drape_arena_take(arena, size, 1);
     drape_lab_setting *settings = drape_arena_take(arena, command->setting_count, sizeof *settings);
     if (drape_arena_status(arena))
         return cli_report_memory(command);
@@ -79,7 +79,7 @@ static int make_def(const cli_lab_request *request, int default_jobs, double def
     for (size_t i = 0; i < command->setting_count; i++)
         settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
     /* scenes/flag.json, tradeoff -> flag.tradeoff */
-    snprintf(folder, room, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, command->verb);
+    snprintf(folder, size, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, command->verb);
     def->scene = command->operand;
     def->scenes = (const char *const *)command->operands;
     def->scene_count = (size_t)command->operand_count;

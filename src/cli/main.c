@@ -62,7 +62,8 @@ static int version(int argc, char **argv)
     return CLI_DONE;
 }
 
-/* A warning that follows itself, as when a scene is read for several purposes, is printed once. */
+/* A warning that is the same as the one before, as when a scene is read for several purposes, is printed
+ * once. */
 static void print_warning(void *user, drape_log_level level, const char *message)
 {
     static char last[400];

@@ -74,11 +74,11 @@ void cli_print_help(const drape_verb *verb)
     print_option("help", NULL, "this text");
 }
 
-const char *cli_shown(char *room, size_t size, const char *text)
+const char *cli_shown(char *out, size_t size, const char *text)
 {
-    snprintf(room, size, "%s", text);
-    drape_make_printable(room);
-    return room;
+    snprintf(out, size, "%s", text);
+    drape_make_printable(out);
+    return out;
 }
 
 int cli_misuse(const char *verb, const char *format, ...)
@@ -107,7 +107,7 @@ void cli_print_message(const cli_command *command, const char *message)
         cli_misuse(command->verb, "%s", message);
 }
 
-/* What failed because a signal ended its wait is not what is wrong. */
+/* A failure of a call whose wait a signal ended is reported as an interruption. */
 int cli_report(const cli_command *command, int code)
 {
     if (cli_interrupted() && code != CLI_INTERRUPTED)

@@ -64,7 +64,7 @@ static void fill_bar(double share, char bar[BAR + 1])
     bar[BAR] = 0;
 }
 
-/* Whether a period has passed since the last update, which is now then. */
+/* Whether a period has passed since the last update; if so, the last update is now. */
 static bool is_due(cli_progress *p, double period)
 {
     const double now = drape_clock_seconds();

@@ -37,10 +37,10 @@ int cli_scene_load_with(const cli_command *command, const char *path, cli_choose
             snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
             status = drape_recorder_check(s->ctx, s->sim, pointer, s->model->formats[i]);
         }
-        if (status && *s->ctx->pointer) /* as where the integrator of the scene does not take its terms */
+        if (status && *s->ctx->pointer) /* such as terms that the integrator of the scene does not take */
             drape_scene_locate_fault(s->scene);
     }
-    if (cli_interrupted()) /* even if loading did not notice it */
+    if (cli_interrupted()) /* even if it came after the last check for it */
         return cli_report_interrupted(command->verb);
     return status ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
 }

@@ -1,7 +1,7 @@
-/* csv.h: writes the fields of a CSV as in RFC 4180, except that lines end in \n alone, as Unix tools
- * expect. Each field is preceded by a comma, so the first field of a row is written by the caller. And the
- * tables of a run: steps.csv, a row for each attempted step, accepted or not, and energy.csv, a row for each
- * frame, both to be written in the C locale; after a failure a table ends with the row before. */
+/* csv.h: writes the fields of a CSV as in RFC 4180, except that lines end in \n alone, as Unix tools expect;
+ * each field is preceded by a comma, so the caller writes the first field of a row. And the tables of a run,
+ * which are written in the C locale: steps.csv, a row for each attempted step, accepted or not, and
+ * energy.csv, a row for each frame. After a failure a table ends with the row before. */
 #ifndef DRAPE_IO_CSV_H
 #define DRAPE_IO_CSV_H
 

@@ -43,19 +43,19 @@
 #define JSON_OFFSET    (DRAPE_GLTF_HEADER + DRAPE_GLTF_CHUNK)
 #define MAX_FRAMES     16384                  /* their weights take 1 GiB */
 #define MAX_BYTES      (UINT32_MAX - 65535.0) /* lengths have 32 bits */
-#define FIXED_ROOM     4096                   /* JSON without the parts of each frame */
-#define PRIMITIVE_ROOM 512
+#define FIXED_SIZE     4096                   /* JSON without the parts of each frame */
+#define PRIMITIVE_SIZE 512
 #define SURFACE_BYTES  3e5 /* of a collider without triangles of its own */
-#define BODY_ROOM      2048
-#define PLACE_ROOM     256 /* ,"translation":[...],"rotation":[...] */
-#define CHANNEL_ROOM   128 /* a channel or a sampler */
+#define BODY_SIZE      2048
+#define PLACE_SIZE     256 /* ,"translation":[...],"rotation":[...] */
+#define CHANNEL_SIZE   128 /* a channel or a sampler */
 #define LIST_HEAD      12  /* ,"targets":[ and ,"weights":[ */
 #define TARGET_WIDTH   36  /* ,{"POSITION":32769,"NORMAL":32770} */
 #define WEIGHT_WIDTH   2   /* ,0 */
 #define LENGTH_WIDTH   10
-#define POSITIONS_ROOM 222 /* the accessor of the positions of a frame, with bounds such as -1.17549435e-38 */
-#define ACCESSOR_ROOM  322 /* and that of the normals */
-#define TIMES_ROOM     320 /* two accessors of the animation */
+#define POSITIONS_SIZE 222 /* the accessor of the positions of a frame, with bounds such as -1.17549435e-38 */
+#define ACCESSOR_SIZE  322 /* and that of the normals */
+#define TIMES_SIZE     320 /* two accessors of the animation */
 
 /* The triangles of one material, or of a collider. */
 typedef struct primitive {
@@ -75,7 +75,7 @@ typedef struct object {
     uint32_t first_primitive, primitives;
     size_t weights; /* their list in the JSON */
     size_t place;   /* blanks in the JSON for where a rigid one is first */
-    float *moves;   /* (room x 7) translation and rotation of a rigid one; NULL: it stays */
+    float *moves;   /* (capacity x 7) translation and rotation of a rigid one; NULL: it stays */
 } object;
 
 /* Positions of the blanks in the JSON, counted from its beginning. */
@@ -86,9 +86,9 @@ typedef struct blanks {
 typedef struct glb_state {
     const drape_export_def *def;
     drape_file file;
-    uint32_t room;   /* number of frames for which there is room */
-    uint32_t frames; /* complete frames in the file */
-    char *json;      /* of the beginning of the file, until its first frame */
+    uint32_t capacity; /* frames that the blanks are enough for */
+    uint32_t frames;   /* complete frames in the file */
+    char *json;        /* of the beginning of the file, until its first frame */
     size_t json_size, used;
     blanks at;
     primitive *primitive;
@@ -103,7 +103,7 @@ typedef struct glb_state {
     double *normal;    /* (points x 3) normals of the frame */
     float *base[2];    /* (points x 3) positions and normals of the first frame: nodes, points of colliders */
     float *moved[2];   /* (points x 3) their differences from these in the frame; the first one has its own */
-    float *times;      /* (room) */
+    float *times;      /* (capacity) */
 } glb_state;
 
 /* ---- Accessors and views ---- */
@@ -116,20 +116,20 @@ typedef struct accessor {
     const float *bounds; /* (width x 2) least and largest; NULL: none are written */
 } accessor;
 
-/* Writes an accessor into text (ACCESSOR_ROOM), which it returns. */
+/* Writes an accessor into text (ACCESSOR_SIZE), which it returns. */
 static const char *describe(accessor a, char *text)
 {
-    int used = snprintf(text, ACCESSOR_ROOM, "{\"bufferView\":%u", a.view);
+    int used = snprintf(text, ACCESSOR_SIZE, "{\"bufferView\":%u", a.view);
     if (a.offset >= 0)
-        used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), ",\"byteOffset\":%" PRId64, a.offset);
-    used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used),
+        used += snprintf(text + used, (size_t)(ACCESSOR_SIZE - used), ",\"byteOffset\":%" PRId64, a.offset);
+    used += snprintf(text + used, (size_t)(ACCESSOR_SIZE - used),
                      ",\"componentType\":%d,\"count\":%u,\"type\":\"%s\"", a.component, a.count,
                      drape_gltf_types[a.width]);
     for (int k = 0; a.bounds && k < 2 * a.width; k++) {
         const char *before = k == 0 ? ",\"min\":[" : k == a.width ? "],\"max\":[" : ",";
-        used += snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), "%s%.9g", before, a.bounds[k]);
+        used += snprintf(text + used, (size_t)(ACCESSOR_SIZE - used), "%s%.9g", before, a.bounds[k]);
     }
-    snprintf(text + used, (size_t)(ACCESSOR_ROOM - used), a.bounds ? "]}" : "}");
+    snprintf(text + used, (size_t)(ACCESSOR_SIZE - used), a.bounds ? "]}" : "}");
     return text;
 }
 
@@ -142,8 +142,9 @@ static void describe_vertices(accessor a, char *positions, char *normals)
     describe(a, normals);
 }
 
-/* Those of the triangles of each primitive are first; then that of the texture coordinates; positions and
- * normals of each rigid object; and for each frame those of each other one. Returns the positions'. */
+/* The number of the accessor of an object's positions in a frame; that of its normals follows. The accessors
+ * are in this order: triangles of each primitive, texture coordinates, positions and normals of each rigid
+ * object, and for each frame positions and normals of each deforming object. */
 static uint32_t accessor_of(const glb_state *glb, uint32_t number, uint32_t frame)
 {
     const uint32_t first = glb->primitives + (glb->uv != NULL), rigid = glb->objects - glb->deforming;
@@ -151,7 +152,8 @@ static uint32_t accessor_of(const glb_state *glb, uint32_t number, uint32_t fram
                                     : first + 2 * (rigid + frame * glb->deforming + number);
 }
 
-/* The views: triangles, frames, texture coordinates, rigid objects, and the times and what is animated. */
+/* The number of the view of the rigid objects. The views are in this order: triangles, frames, texture
+ * coordinates, rigid objects, and the animation. */
 static uint32_t rigid_view(const glb_state *glb)
 {
     return 2 + (glb->uv != NULL);
@@ -220,7 +222,7 @@ static int compare_names(const void *left, const void *right)
     return strcmp(((const primitive *)left)->name, ((const primitive *)right)->name);
 }
 
-/* One for each name that triangles have, in the order of the names. */
+/* Makes a primitive for each name of a material that triangles have, in the order of the names. */
 static drape_status make_primitives(glb_state *glb)
 {
     const drape_render_surface *surface = &glb->def->model->surface;
@@ -243,7 +245,7 @@ static drape_status make_primitives(glb_state *glb)
     return DRAPE_OK;
 }
 
-/* Its vertices, and its triangles where their primitives have them. */
+/* Adds the vertices of a cloth, and its triangles to those of their primitives. */
 static drape_status add_cloth(glb_state *glb, const drape_render_cloth *cloth)
 {
     const drape_faces *faces = &cloth->mesh->faces;
@@ -295,7 +297,7 @@ static drape_status take_arrays(glb_state *glb)
     return drape_arena_status(def->arena);
 }
 
-/* Those that deform come before the rigid ones. */
+/* Adds the rigid colliders as objects, or those that deform, which come first. */
 static void add_bodies(glb_state *glb, bool rigid)
 {
     const drape_export_def *def = glb->def;
@@ -319,7 +321,7 @@ static void add_bodies(glb_state *glb, bool rigid)
         for (uint32_t i = 0; i < o->points; i++)
             glb->node[glb->vertices++] = (int32_t)glb->points++;
         if (body->moves && rigid) {
-            o->moves = drape_arena_take(def->arena, glb->room, 7 * sizeof *o->moves);
+            o->moves = drape_arena_take(def->arena, glb->capacity, 7 * sizeof *o->moves);
             glb->moving++;
         }
     }
@@ -377,7 +379,7 @@ static size_t add_blanks(glb_state *glb, size_t count)
 /* Adds blanks for a list of texts of one width, each for a frame after the first. */
 static size_t add_list(glb_state *glb, size_t width)
 {
-    return add_blanks(glb, LIST_HEAD + glb->room * width + 1);
+    return add_blanks(glb, LIST_HEAD + glb->capacity * width + 1);
 }
 
 static void add_views(glb_state *glb)
@@ -400,13 +402,13 @@ static void add_views(glb_state *glb)
         add(glb, vertices, triangle_bytes + glb->uv_bytes, 12, DRAPE_GLTF_VERTICES);
         add(glb, "%u}", glb->rigid_bytes);
     }
-    glb->at.views = add_blanks(glb, TIMES_ROOM);
+    glb->at.views = add_blanks(glb, TIMES_SIZE);
     add(glb, "],");
 }
 
 static void add_accessors(glb_state *glb)
 {
-    char text[ACCESSOR_ROOM], normals[ACCESSOR_ROOM];
+    char text[ACCESSOR_SIZE], normals[ACCESSOR_SIZE];
     float bounds[6];
     add(glb, "\"accessors\":[");
     for (uint32_t i = 0; i < glb->primitives; i++) {
@@ -429,8 +431,8 @@ static void add_accessors(glb_state *glb)
                           text, normals);
         add(glb, ",%s,%s", text, normals);
     }
-    glb->at.accessors = add_blanks(glb, (size_t)glb->room * glb->deforming * ACCESSOR_ROOM);
-    glb->at.times = add_blanks(glb, TIMES_ROOM * (1 + (size_t)glb->moving));
+    glb->at.accessors = add_blanks(glb, (size_t)glb->capacity * glb->deforming * ACCESSOR_SIZE);
+    glb->at.times = add_blanks(glb, TIMES_SIZE * (1 + (size_t)glb->moving));
     add(glb, "]");
 }
 
@@ -474,7 +476,7 @@ static void make_json(glb_state *glb)
     add(glb, "]}],\"nodes\":[");
     for (uint32_t i = 0; i < glb->objects; i++) {
         add(glb, "%s{\"name\":%s,\"mesh\":%u", i ? "," : "", glb->object[i].name, i);
-        glb->object[i].place = add_blanks(glb, i < glb->deforming ? 0 : PLACE_ROOM);
+        glb->object[i].place = add_blanks(glb, i < glb->deforming ? 0 : PLACE_SIZE);
         add(glb, "}");
     }
     add(glb, "],\"materials\":[");
@@ -487,7 +489,7 @@ static void make_json(glb_state *glb)
     add_views(glb);
     add_accessors(glb);
     add_meshes(glb);
-    glb->at.animation = add_blanks(glb, (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_ROOM);
+    glb->at.animation = add_blanks(glb, (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_SIZE);
     add(glb, "}");
     add_blanks(glb, 3 - (glb->used + 3) % 4);
     glb->json_size = glb->used;
@@ -495,10 +497,10 @@ static void make_json(glb_state *glb)
 
 /* ---- Opening ---- */
 
-/* Bytes of JSON for each frame. */
+/* Bytes of JSON that a frame takes. */
 static double frame_room(double objects, double primitives)
 {
-    return objects * (ACCESSOR_ROOM + WEIGHT_WIDTH) + primitives * TARGET_WIDTH;
+    return objects * (ACCESSOR_SIZE + WEIGHT_WIDTH) + primitives * TARGET_WIDTH;
 }
 
 static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
@@ -530,15 +532,15 @@ static drape_status glb_open(const drape_export_def *def, void *state)
     glb_state *glb = state;
     drape_arena *arena = def->arena;
     glb->def = def;
-    glb->room = (uint32_t)def->most_frames;
+    glb->capacity = (uint32_t)def->most_frames;
     drape_status status = make_objects(glb);
     if (status)
         return status;
-    glb->json_size = FIXED_ROOM + (size_t)glb->room * (size_t)frame_room(glb->objects, glb->primitives);
+    glb->json_size = FIXED_SIZE + (size_t)glb->capacity * (size_t)frame_room(glb->objects, glb->primitives);
     for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        glb->json_size += PRIMITIVE_ROOM + strlen(glb->primitive[p].quoted);
+        glb->json_size += PRIMITIVE_SIZE + strlen(glb->primitive[p].quoted);
     for (uint32_t i = 1; i < glb->objects; i++)
-        glb->json_size += BODY_ROOM + 2 * strlen(glb->object[i].name);
+        glb->json_size += BODY_SIZE + 2 * strlen(glb->object[i].name);
     glb->json = drape_arena_take(arena, glb->json_size, 1);
     const size_t count = 3 * (size_t)glb->points;
     glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
@@ -546,7 +548,7 @@ static drape_status glb_open(const drape_export_def *def, void *state)
         glb->base[part] = drape_arena_take(arena, count, sizeof **glb->base);
         glb->moved[part] = drape_arena_take(arena, count, sizeof **glb->moved);
     }
-    glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
+    glb->times = drape_arena_take(arena, glb->capacity, sizeof *glb->times);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     make_json(glb);
@@ -555,7 +557,8 @@ static drape_status glb_open(const drape_export_def *def, void *state)
 
 /* ---- Changes to the beginning of the file ---- */
 
-/* Writes bytes of the JSON: of that in memory before the file appears with its first frame. */
+/* Overwrites bytes of the JSON: in memory before the first frame, with which the file appears, and in the
+ * file after it. */
 static void overwrite(glb_state *glb, size_t at, const char *text, size_t size)
 {
     if (glb->frames == 0)
@@ -567,7 +570,7 @@ static void overwrite(glb_state *glb, size_t at, const char *text, size_t size)
 static void fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
 static void fill(glb_state *glb, size_t at, const char *format, ...)
 {
-    char text[2 * TIMES_ROOM];
+    char text[2 * TIMES_SIZE];
     va_list values;
     va_start(values, format);
     const int length = vsnprintf(text, sizeof text, format, values);
@@ -575,12 +578,13 @@ static void fill(glb_state *glb, size_t at, const char *format, ...)
     overwrite(glb, at, text, (size_t)length);
 }
 
-/* Adds the text of this frame to a list; that of the first target comes with the key. */
+/* Fills in the item of this frame in a list of the JSON; with the first item also the key and the brackets.
+ */
 static void fill_list(glb_state *glb, size_t list, size_t width, const char *key, const char *text)
 {
     const size_t target = glb->frames - 1;
     if (target == 0) {
-        fill(glb, list + LIST_HEAD + glb->room * width, "]");
+        fill(glb, list + LIST_HEAD + glb->capacity * width, "]");
         fill(glb, list, ",\"%s\":[%s", key, text);
     } else {
         fill(glb, list + LIST_HEAD + target * width, ",%s", text);
@@ -625,22 +629,23 @@ static void find_differences(glb_state *glb, const drape_frame *frame)
     }
 }
 
-/* The accessors of each object in this frame and, after the first one, its target and weight. */
+/* Fills in the accessors of each deforming object for this frame and, after the first frame, its morph target
+ * and weight. */
 static void fill_frame(glb_state *glb)
 {
     for (uint32_t number = 0; number < glb->deforming; number++) {
         const object *o = &glb->object[number];
         const uint32_t positions = accessor_of(glb, number, glb->frames);
-        const size_t at = glb->at.accessors + (glb->frames * (size_t)glb->deforming + number) * ACCESSOR_ROOM;
+        const size_t at = glb->at.accessors + (glb->frames * (size_t)glb->deforming + number) * ACCESSOR_SIZE;
         float bounds[6];
-        char text[ACCESSOR_ROOM], normals[ACCESSOR_ROOM];
+        char text[ACCESSOR_SIZE], normals[ACCESSOR_SIZE];
         find_bounds(glb->moved[0] + 3 * (size_t)o->first_point, 3, o->points, bounds);
         describe_vertices((accessor){1,
                                      glb->frames * (int64_t)glb->frame_bytes + 24 * (int64_t)o->first_vertex,
                                      DRAPE_GLTF_FLOAT, 3, o->vertices, bounds},
                           text, normals);
         fill(glb, at, ",%s", text);
-        fill(glb, at + POSITIONS_ROOM, ",%s", normals);
+        fill(glb, at + POSITIONS_SIZE, ",%s", normals);
         if (glb->frames == 0)
             continue;
         snprintf(text, sizeof text, "{\"POSITION\":%u,\"NORMAL\":%u}", positions, positions + 1);
@@ -650,7 +655,7 @@ static void fill_frame(glb_state *glb)
     }
 }
 
-/* node (count): the vectors that vertices have; NULL: one for each. */
+/* Puts `count` vectors, which are `stride` numbers apart: number node[i], or i if node is NULL. */
 static void put_vectors(glb_state *glb, const float *value, size_t stride, const int32_t *node, size_t count)
 {
     for (size_t i = 0; i < count; i++)
@@ -666,8 +671,9 @@ static void put_frame(glb_state *glb)
                         glb->object[i].vertices);
 }
 
-/* Where rigid objects are in this frame; the first one is where the scene shows them. Translation and
- * rotation, a quaternion x, y, z, w; of the two of a rotation that nearer to the one before. */
+/* Keeps translation and rotation of each rigid object in this frame; those of the first frame are also
+ * written into the JSON. A rotation is a quaternion x, y, z, w; of its two signs that is taken which is
+ * nearer to the frame before. */
 static void keep_places(glb_state *glb, const drape_frame *frame)
 {
     for (uint32_t i = glb->deforming; i < glb->objects; i++) {
@@ -729,10 +735,10 @@ static drape_status write_first(glb_state *glb)
 static drape_status glb_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     glb_state *glb = state;
-    if (glb->frames == glb->room)
+    if (glb->frames == glb->capacity)
         return drape_fail(def->ctx, DRAPE_E_FILE,
                           "\"%.300s/%.200s\" has room for %u frames, those of the scene's duration",
-                          drape_folder_path(def->folder), glb->file.path, glb->room);
+                          drape_folder_path(def->folder), glb->file.path, glb->capacity);
     float *time = &glb->times[glb->frames];
     *time = (float)frame->time;
     if (glb->frames > 0 && !(*time > time[-1]))
@@ -754,47 +760,49 @@ static drape_status glb_write(const drape_export_def *def, void *state, const dr
 
 /* ---- Animation and end ---- */
 
-/* The view and the accessors of times, weights, and translations and rotations of the objects that move. */
+/* Fills in the view and the accessors of times, weights, translations and rotations. */
 static void fill_accessors(glb_state *glb)
 {
     const uint32_t n = glb->frames, view = rigid_view(glb) + (glb->objects > glb->deforming);
     const float bounds[2] = {glb->times[0], glb->times[n - 1]};
-    char first[ACCESSOR_ROOM], second[ACCESSOR_ROOM];
+    char first[ACCESSOR_SIZE], second[ACCESSOR_SIZE];
     fill(glb, glb->at.views, ",{\"buffer\":0,\"byteOffset\":%u,\"byteLength\":%u}",
          glb->fixed_bytes + n * glb->frame_bytes, 4 * n * (n + 7 * glb->moving));
     fill(glb, glb->at.times, ",%s,%s", describe((accessor){view, -1, DRAPE_GLTF_FLOAT, 1, n, bounds}, first),
          describe((accessor){view, 4 * (int64_t)n, DRAPE_GLTF_FLOAT, 1, n * (n - 1), NULL}, second));
     for (uint32_t i = 0; i < glb->moving; i++) {
         const int64_t offset = 4 * (int64_t)n * (n + 7 * i);
-        fill(glb, glb->at.times + (1 + i) * (size_t)TIMES_ROOM, ",%s,%s",
+        fill(glb, glb->at.times + (1 + i) * (size_t)TIMES_SIZE, ",%s,%s",
              describe((accessor){view, offset, DRAPE_GLTF_FLOAT, 3, n, NULL}, first),
              describe((accessor){view, offset + 12 * n, DRAPE_GLTF_FLOAT, 4, n, NULL}, second));
     }
 }
 
-/* A channel for the weights of each object, all by one sampler, and two for each one that moves. */
+/* Fills in the channels: for the weights of each deforming object, which share one sampler, and for
+ * translation and rotation of each rigid object that moves. */
 static void fill_channels(glb_state *glb)
 {
     const uint32_t times = accessor_of(glb, 0, glb->frames);
     size_t at = glb->at.animation;
     uint32_t sampler = 1;
     fill(glb, at, ",\"animations\":[{\"name\":\"run\",\"channels\":[");
-    at += CHANNEL_ROOM;
-    for (uint32_t i = 0; i < glb->deforming; i++, at += CHANNEL_ROOM)
+    at += CHANNEL_SIZE;
+    for (uint32_t i = 0; i < glb->deforming; i++, at += CHANNEL_SIZE)
         fill(glb, at, "%s{\"sampler\":0,\"target\":{\"node\":%u,\"path\":\"weights\"}}", i ? "," : "", i);
     for (uint32_t i = glb->deforming; i < glb->objects; i++)
-        for (int turns = 0; turns < 2 && glb->object[i].moves; turns++, at += CHANNEL_ROOM)
+        for (int turns = 0; turns < 2 && glb->object[i].moves; turns++, at += CHANNEL_SIZE)
             fill(glb, at, ",{\"sampler\":%u,\"target\":{\"node\":%u,\"path\":\"%s\"}}", sampler++, i,
                  turns ? "rotation" : "translation");
     fill(glb, at, "],\"samplers\":[");
-    at += CHANNEL_ROOM / 2;
-    for (uint32_t i = 0; i < sampler; i++, at += CHANNEL_ROOM)
+    at += CHANNEL_SIZE / 2;
+    for (uint32_t i = 0; i < sampler; i++, at += CHANNEL_SIZE)
         fill(glb, at, "%s{\"input\":%u,\"interpolation\":\"LINEAR\",\"output\":%u}", i ? "," : "", times,
              times + 1 + i);
     fill(glb, at, "]}]");
 }
 
-/* Times and weights, n + n (n - 1) numbers, then 7 n of each object that moves. */
+/* The end of the binary chunk: n times, n (n - 1) weights, and 7 n numbers of each rigid object that moves.
+ */
 static drape_status glb_close(const drape_export_def *def, void *state)
 {
     glb_state *glb = state;
@@ -829,9 +837,9 @@ static void glb_archive(void *state, drape_archive *a)
     drape_archive_same(a, "the number of vertices in " FILE_NAME, glb->vertices);
     drape_archive_same(a, "the number of materials in " FILE_NAME, glb->primitives);
     drape_archive_same(a, "the number of colliders that move in " FILE_NAME, glb->moving);
-    if (a->reading && (frames < 0 || frames > glb->room))
+    if (a->reading && (frames < 0 || frames > glb->capacity))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %lld frames of %u", (long long)frames,
-                           glb->room);
+                           glb->capacity);
     if (a->status)
         return;
     glb->frames = (uint32_t)frames;

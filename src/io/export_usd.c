@@ -31,18 +31,18 @@
 #define FILE_NAME   "positions.usda"
 #define PART_NAME   "positions_%" PRId32 ".usda"
 #define MAX_CHANGES 256 /* objects that change: each is an open file */
-#define NAME_ROOM   64
+#define NAME_SIZE   64
 #define MATERIALS   "materials"
 #define PLAIN       "cloth"
 #define BINDING     "rel material:binding = </run/" MATERIALS "/%s>\n"
 
 /* An extent, and the last time code, have this many characters whatever their values. */
 #define EXTENT      "[(%15.8e, %15.8e, %15.8e), (%15.8e, %15.8e, %15.8e)]"
-#define EXTENT_ROOM 128
+#define EXTENT_SIZE 128
 #define CODE        "%-20.12g"
-#define CODE_ROOM   32
+#define CODE_SIZE   32
 
-/* What records overwrite (drape_file_change), in the order in which it is declared: the last time code, the
+/* What records overwrite (drape_file_declare), in the order in which it is declared: the last time code, the
  * tail, and the extent of what deforms. */
 enum { END, TAIL, BOUNDS };
 
@@ -51,7 +51,7 @@ static const char tails[2][16] = {"}\n}\n}\n", "}\n}\n"};
 
 /* A cloth or a collider. */
 typedef struct object {
-    char name[NAME_ROOM];
+    char name[NAME_SIZE];
     int32_t cloth, body; /* one of them is -1 */
     bool changes;
     drape_file file;        /* of what changes */
@@ -61,7 +61,7 @@ typedef struct object {
 
 typedef struct material {
     const char *name; /* NULL: of faces that have none */
-    char prim[NAME_ROOM];
+    char prim[NAME_SIZE];
 } material;
 
 typedef struct usd_state {
@@ -107,12 +107,12 @@ static bool is_taken(const usd_state *usd, bool of_material, const char *name)
 
 /* The identifier of a name, with a number if it is taken. A name of a prim has letters, digits and
  * underscores, and begins with none of the digits. */
-static void choose_name(const usd_state *usd, bool of_material, const char *name, char out[NAME_ROOM])
+static void choose_name(const usd_state *usd, bool of_material, const char *name, char out[NAME_SIZE])
 {
     size_t used = 0;
     if (*name >= '0' && *name <= '9')
         out[used++] = '_';
-    for (; *name && used < NAME_ROOM - 16; name++) {
+    for (; *name && used < NAME_SIZE - 16; name++) {
         const bool good = (*name >= 'a' && *name <= 'z') || (*name >= 'A' && *name <= 'Z') ||
                           (*name >= '0' && *name <= '9') || *name == '_';
         out[used++] = good ? *name : '_';
@@ -121,7 +121,7 @@ static void choose_name(const usd_state *usd, bool of_material, const char *name
         out[used++] = '_';
     out[used] = 0;
     for (int number = 1; is_taken(usd, of_material, out); number++)
-        snprintf(out + used, NAME_ROOM - used, "_%d", number);
+        snprintf(out + used, NAME_SIZE - used, "_%d", number);
 }
 
 /* The number of a material; -1: there is no such material yet. */
@@ -201,7 +201,7 @@ static drape_status usd_open(const drape_export_def *def, void *state)
     usd->def = def;
     drape_status status = list_objects(usd);
     for (int32_t i = 0; i < usd->objects && !status; i++) {
-        char name[NAME_ROOM];
+        char name[NAME_SIZE];
         object *o = &usd->object[i];
         snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
         if (o->changes)
@@ -232,7 +232,7 @@ static void put_numbers(drape_file *file, const char *attribute, const int32_t *
     drape_file_put_text(file, "]\n");
 }
 
-/* The faces that have one of the materials of the mesh. */
+/* Puts the subset of the faces that have this material of the mesh. */
 static void put_subset(usd_state *usd, drape_file *file, const drape_faces *faces, int32_t number)
 {
     const material *m = &usd->material[find_material(usd, faces->name[number])];
@@ -328,7 +328,8 @@ static void put_matrix(drape_file *file, const drape_collider_pose *pose)
                      R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8], d[0], d[1], d[2]);
 }
 
-/* Beside the transformation itself, also if that is in a file of its own. */
+/* The order of transformations, which stands beside the transformation, also if that is in a file of its own.
+ */
 static const char order[] = "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n";
 
 /* ---- What changes ---- */
@@ -366,9 +367,9 @@ static void put_sample(usd_state *usd, object *o, const drape_frame *frame, doub
     drape_file_put_text(file, ",\n");
 }
 
-static void format_extent(const object *o, char text[EXTENT_ROOM])
+static void format_extent(const object *o, char text[EXTENT_SIZE])
 {
-    snprintf(text, EXTENT_ROOM, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1], o->high[2]);
+    snprintf(text, EXTENT_SIZE, EXTENT, o->low[0], o->low[1], o->low[2], o->high[0], o->high[1], o->high[2]);
 }
 
 /* Where the samples begin; before it the extent of what deforms. */
@@ -377,7 +378,7 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
     const char *tail = tails[o->number > 0];
     drape_file_declare(&o->file, -(int64_t)strlen(tail), strlen(tail));
     if (deforms(usd, o)) {
-        char extent[EXTENT_ROOM];
+        char extent[EXTENT_SIZE];
         for (int32_t i = 0; i < point_count(usd, o); i++)
             include(o, point_at(usd, o, frame, i));
         format_extent(o, extent);
@@ -395,7 +396,7 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
 
 static void put_metadata(usd_state *usd, object *o, const char *prim)
 {
-    char code[CODE_ROOM];
+    char code[CODE_SIZE];
     drape_file *file = &o->file;
     drape_file_print(file,
                      "#usda 1.0\n(\ndefaultPrim = \"%s\"\ndoc = \"Drape %s\"\nframesPerSecond = %.17g\n"
@@ -469,7 +470,7 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
 static drape_status write_next(usd_state *usd, object *o, const drape_frame *frame)
 {
     static const char blanks[] = "                ";
-    char extent[EXTENT_ROOM], code[CODE_ROOM];
+    char extent[EXTENT_SIZE], code[CODE_SIZE];
     const char *tail = tails[o->number > 0];
     const size_t length = strlen(tail);
     const off_t before = o->file.kept;

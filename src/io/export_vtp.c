@@ -16,7 +16,7 @@
 #include "io/export.h"
 
 #define PVD_NAME "frames.pvd"
-#define PVD_ROOM 256 /* for an entry and the last line */
+#define PVD_SIZE 256 /* for an entry and the last line */
 
 /* A collider that stays, and one that does not, in a frame. */
 #define BODY_NAME       "collider_%" PRId32 ".vtp"
@@ -29,7 +29,7 @@ static const char pvd_end[] = "</Collection></VTKFile>\n";
 
 typedef struct vtp_state {
     drape_file pvd;
-    char *entries; /* (PVD_ROOM (1 + body_count)) of one frame */
+    char *entries; /* (PVD_SIZE (1 + body_count)) of one frame */
 } vtp_state;
 
 /* ---- The collection ---- */
@@ -49,7 +49,7 @@ static void format_body_name(const drape_export_def *def, int32_t number, int64_
 
 static size_t put_entry(vtp_state *vtp, size_t at, double time, int32_t part, const char *name)
 {
-    return at + (size_t)snprintf(vtp->entries + at, PVD_ROOM,
+    return at + (size_t)snprintf(vtp->entries + at, PVD_SIZE,
                                  "<DataSet timestep=\"%.17g\" part=\"%" PRId32 "\" file=\"%s\"/>\n", time,
                                  part, name);
 }
@@ -244,7 +244,7 @@ static drape_status write_body(const drape_export_def *def, const drape_frame *f
 static drape_status vtp_open(const drape_export_def *def, void *state)
 {
     vtp_state *vtp = state;
-    vtp->entries = drape_arena_take(def->arena, 1 + (size_t)def->body_count, PVD_ROOM);
+    vtp->entries = drape_arena_take(def->arena, 1 + (size_t)def->body_count, PVD_SIZE);
     drape_status status = vtp->entries ? drape_export_open(def, PVD_NAME, &vtp->pvd) : DRAPE_E_MEMORY;
     if (status || def->resumes)
         return status;

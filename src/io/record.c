@@ -75,12 +75,12 @@ drape_status drape_record_read(const drape_record *run, int64_t frame, double *x
 
 /* ---- Tables ---- */
 
-/* Splits a line of CSV (RFC 4180) in place. Returns the number of cells, at most room. */
-static size_t split(char *line, char **cells, size_t room)
+/* Splits a line of CSV (RFC 4180) in place. Returns the number of cells, at most `capacity`. */
+static size_t split(char *line, char **cells, size_t capacity)
 {
     size_t count = 0;
     char *in = line;
-    while (count < room) {
+    while (count < capacity) {
         char *out = in;
         cells[count++] = out;
         if (*in == '"')

@@ -48,7 +48,7 @@ struct drape_recorder {
     double last_time;     /* [s] of the last frame */
     bool moved;           /* a step was accepted after the last frame */
     bool gathers;         /* ranks share the model, and a format is written by rank 0 */
-    bool counted;         /* the def says how many frames come */
+    bool counted;         /* the caller gave the number of frames */
     bool live;            /* the files can be written */
     drape_status failure; /* the first one; DRAPE_OK: none */
     char message[DRAPE_MESSAGE_SIZE];
@@ -106,8 +106,8 @@ static drape_rows rows_of(const drape_model *m, const double *values, int width)
     return (drape_rows){values, width, m->node_count, m->part->all_nodes, m->part->own, m->part->node};
 }
 
-/* Where ranks share the model, *values (here) become those of the whole on rank 0, in one of its arrays,
- * unless no format needs them there. */
+/* Where ranks share the model, gathers an array of nodes: *values, here that of this rank, becomes that of
+ * the whole model on rank 0. It stays as it is if no format needs it there. */
 static void gather(drape_recorder *r, int array, int width, const double **values)
 {
     double *all = r->gathered ? r->gathered + 3 * (size_t)array * (size_t)r->model->node_count : NULL;
@@ -143,7 +143,7 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
         const output *o = &r->outputs[i];
         char path[DRAPE_RANKS_PATH];
         uint64_t sum = 0;
-        if (!is_shared(r, o)) /* each rank writes the nodes that it owns behind what rank 0 has in the file */
+        if (!is_shared(r, o)) /* each rank writes its own nodes behind what the file of rank 0 has */
             continue;
         const drape_rows rows = rows_of(r->sim->model, positions, 3);
         drape_file *file = r->progress.writes && !r->failure ? o->ops->shared(o->state) : NULL;
@@ -399,7 +399,7 @@ static drape_status protect(void *user, const char *path, const char *pointer)
     return drape_folder_protect(user, path);
 }
 
-/* Only the folder may be new after this. */
+/* Opens the folder and protects the inputs; nothing is created but the folder. */
 static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def)
 {
     r->also = def->also;

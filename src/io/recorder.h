@@ -22,8 +22,9 @@ typedef struct drape_recorder_def {
     drape_archive *archive; /* of a checkpoint in the folder, of which the sim's part was read: the run is
                                continued. NULL: it begins */
     double start;           /* [s] clock when the run began: checkpoints contain how long it took */
-    int64_t frames; /* so many frames come, whatever the scene's duration is, and none at the end; 0: those of
-                       the duration */
+    /* Number of frames, where the caller notifies of each, and none is added at the end; 0: those of the
+     * scene's duration. */
+    int64_t frames;
 } drape_recorder_def;
 
 typedef struct drape_recorder drape_recorder;

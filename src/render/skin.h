@@ -22,7 +22,7 @@ typedef struct drape_skin_vertex {
 
 typedef struct drape_skin {
     const drape_model *model;
-    /* (collider_count) of which distances count, in the coordinates of the model's; NULL: those */
+    /* (collider_count) with their shapes at the drawn time; NULL: those of the model */
     const drape_collider *const *collider;
     int level; /* pieces of an edge */
 

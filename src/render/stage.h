@@ -31,7 +31,7 @@ typedef struct drape_stage {
     drape_skin skin;
     drape_gl_mesh cloth, hem, wires, pins;
     drape_stage_body *bodies;        /* (body_count) the model's colliders */
-    const drape_collider **collider; /* (body_count) of which distances count now */
+    const drape_collider **collider; /* (body_count) where distances from them are measured now */
     int32_t body_count;
     size_t wire_count, pin_count;
     uint8_t *pinned;         /* (nodes of the surface) */
