@@ -51,12 +51,15 @@ static const char tails[2][16] = {"}\n}\n}\n", "}\n}\n"};
 
 /* A cloth or a collider. */
 typedef struct object {
-    char name[NAME_SIZE];
-    int32_t cloth, body; /* one of them is -1 */
-    bool changes;
-    drape_file file;        /* of what changes */
-    int32_t number;         /* of that file; 0: positions.usda */
-    double low[3], high[3]; /* [m] of all frames so far, if its points change */
+    const char *given_name;
+    char name[NAME_SIZE];          /* the same as an identifier */
+    const drape_mesh *mesh;        /* of a cloth; NULL: it is a collider */
+    const drape_export_body *body; /* NULL: it is a cloth */
+    bool deforms;                  /* its points change, not only its place */
+    int32_t first_point, points;   /* of what deforms, among the positions of a frame */
+    int32_t number;                /* of the file of what changes; 0: positions.usda, -1: nothing changes */
+    drape_file file;
+    double low[3], high[3]; /* [m] of all frames so far, of what deforms */
 } object;
 
 typedef struct material {
@@ -72,27 +75,6 @@ typedef struct usd_state {
     int32_t materials;
     double code; /* time code of the last frame */
 } usd_state;
-
-static const drape_mesh *mesh_of(const usd_state *usd, const object *o)
-{
-    return usd->def->model->surface.cloths[o->cloth].mesh;
-}
-
-static const drape_export_body *body_of(const usd_state *usd, const object *o)
-{
-    return o->body < 0 ? NULL : &usd->def->bodies[o->body];
-}
-
-static int32_t point_count(const usd_state *usd, const object *o)
-{
-    return o->body < 0 ? mesh_of(usd, o)->node_count : body_of(usd, o)->vertex_count;
-}
-
-/* Whether its points change, not only its place. */
-static bool deforms(const usd_state *usd, const object *o)
-{
-    return o->body < 0 || body_of(usd, o)->deforms;
-}
 
 /* ---- Names ---- */
 
@@ -178,19 +160,21 @@ static drape_status list_objects(usd_state *usd)
     int32_t files = 0;
     for (int32_t i = 0; i < surface->cloth_count + usd->def->body_count; i++) {
         object *o = &usd->object[i];
-        o->cloth = i < surface->cloth_count ? i : -1;
-        o->body = o->cloth < 0 ? i - surface->cloth_count : -1;
-        const drape_export_body *body = body_of(usd, o);
-        choose_name(usd, false, body ? body->name : surface->cloths[i].name, o->name);
+        const drape_render_cloth *cloth = i < surface->cloth_count ? &surface->cloths[i] : NULL;
+        const drape_export_body *body = cloth ? NULL : &usd->def->bodies[i - surface->cloth_count];
+        *o = (object){.given_name = cloth ? cloth->name : body->name,
+                      .mesh = cloth ? cloth->mesh : NULL,
+                      .body = body,
+                      .deforms = cloth || body->deforms,
+                      .first_point = cloth ? cloth->first_node : body->first_point,
+                      .points = cloth ? cloth->mesh->node_count : body->vertex_count,
+                      .number = cloth || body->deforms || body->moves ? files++ : -1,
+                      .low = {DBL_MAX, DBL_MAX, DBL_MAX},
+                      .high = {-DBL_MAX, -DBL_MAX, -DBL_MAX}};
+        choose_name(usd, false, o->given_name, o->name);
         usd->objects++;
-        o->changes = !body || body->deforms || body->moves;
-        o->number = o->changes ? files++ : -1;
-        for (int k = 0; k < 3; k++) {
-            o->low[k] = DBL_MAX;
-            o->high[k] = -DBL_MAX;
-        }
-        for (int32_t m = 0; !body && m < mesh_of(usd, o)->faces.material_count; m++)
-            add_material(usd, mesh_of(usd, o)->faces.name[m]);
+        for (int32_t m = 0; cloth && m < cloth->mesh->faces.material_count; m++)
+            add_material(usd, cloth->mesh->faces.name[m]);
     }
     return DRAPE_OK;
 }
@@ -204,7 +188,7 @@ static drape_status usd_open(const drape_export_def *def, void *state)
         char name[NAME_SIZE];
         object *o = &usd->object[i];
         snprintf(name, sizeof name, o->number == 0 ? FILE_NAME : PART_NAME, o->number);
-        if (o->changes)
+        if (o->number >= 0)
             status = drape_export_open(def, name, &o->file);
     }
     return status;
@@ -263,7 +247,7 @@ static void put_triangles(drape_file *file, const int32_t *triangle, int32_t cou
 
 static void put_cloth(usd_state *usd, drape_file *file, const object *o)
 {
-    const drape_mesh *mesh = mesh_of(usd, o);
+    const drape_mesh *mesh = o->mesh;
     const drape_faces *faces = &mesh->faces;
     drape_file_put_text(file, "uniform bool doubleSided = 1\n");
     drape_file_print(file, BINDING, usd->material[0].prim);
@@ -334,37 +318,33 @@ static const char order[] = "uniform token[] xformOpOrder = [\"xformOp:transform
 
 /* ---- What changes ---- */
 
-static void include(object *o, const double *x)
+/* Extends the bounds of what deforms by the points of a frame. */
+static void extend(object *o, const drape_frame *frame)
 {
-    for (int k = 0; k < 3; k++) {
-        o->low[k] = fmin(o->low[k], (double)(float)x[k]);
-        o->high[k] = fmax(o->high[k], (double)(float)x[k]);
+    const double *x = frame->positions + 3 * (size_t)o->first_point;
+    for (int32_t i = 0; o->deforms && i < 3 * o->points; i++) {
+        o->low[i % 3] = fmin(o->low[i % 3], (double)(float)x[i]);
+        o->high[i % 3] = fmax(o->high[i % 3], (double)(float)x[i]);
     }
 }
 
-static const double *point_at(const usd_state *usd, const object *o, const drape_frame *frame, int32_t i)
+static const drape_collider_pose *pose_of(const usd_state *usd, const object *o, const drape_frame *frame)
 {
-    const int32_t first =
-        o->body < 0 ? usd->def->model->surface.cloths[o->cloth].first_node : body_of(usd, o)->first_point;
-    return frame->positions + 3 * (size_t)(first + i);
+    return &frame->poses[o->body - usd->def->bodies];
 }
 
 /* The sample of a frame: in one line, which may be a comment. */
-static void put_sample(usd_state *usd, object *o, const drape_frame *frame, double code)
+static void put_sample(usd_state *usd, object *o, const drape_frame *frame)
 {
     drape_file *file = &o->file;
-    drape_file_print(file, "%.12g: ", code);
-    if (!deforms(usd, o)) {
-        put_matrix(file, &frame->poses[o->body]);
-    } else {
-        for (int32_t i = 0; i < point_count(usd, o); i++) {
-            const double *x = point_at(usd, o, frame, i);
-            drape_file_print(file, "%s(%.9g, %.9g, %.9g)", i ? ", " : "[", (double)(float)x[0],
-                             (double)(float)x[1], (double)(float)x[2]);
-        }
-        drape_file_put_text(file, "]");
-    }
-    drape_file_put_text(file, ",\n");
+    const double *x = frame->positions + 3 * (size_t)o->first_point;
+    drape_file_print(file, "%.12g: ", usd->code);
+    if (!o->deforms)
+        put_matrix(file, pose_of(usd, o, frame));
+    for (int32_t i = 0; o->deforms && i < o->points; i++, x += 3)
+        drape_file_print(file, "%s(%.9g, %.9g, %.9g)", i ? ", " : "[", (double)(float)x[0],
+                         (double)(float)x[1], (double)(float)x[2]);
+    drape_file_put_text(file, o->deforms ? "],\n" : ",\n");
 }
 
 static void format_extent(const object *o, char text[EXTENT_SIZE])
@@ -377,10 +357,9 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
 {
     const char *tail = tails[o->number > 0];
     drape_file_declare(&o->file, -(int64_t)strlen(tail), strlen(tail));
-    if (deforms(usd, o)) {
+    if (o->deforms) {
         char extent[EXTENT_SIZE];
-        for (int32_t i = 0; i < point_count(usd, o); i++)
-            include(o, point_at(usd, o, frame, i));
+        extend(o, frame);
         format_extent(o, extent);
         drape_file_put_text(&o->file, "float3[] extent = ");
         drape_file_declare(&o->file, drape_file_end(&o->file), strlen(extent));
@@ -390,7 +369,7 @@ static void put_samples(usd_state *usd, object *o, const drape_frame *frame)
         drape_file_put_text(&o->file, order);
         drape_file_put_text(&o->file, "matrix4d xformOp:transform.timeSamples = {\n");
     }
-    put_sample(usd, o, frame, usd->code);
+    put_sample(usd, o, frame);
     drape_file_put_text(&o->file, tail);
 }
 
@@ -412,9 +391,9 @@ static void put_metadata(usd_state *usd, object *o, const char *prim)
 
 static void begin_mesh(usd_state *usd, drape_file *file, const object *o)
 {
-    const drape_export_body *body = body_of(usd, o);
+    const drape_export_body *body = o->body;
     drape_file_print(file, "def Mesh \"%s\" (\ndoc = ", o->name);
-    put_text(file, body ? body->name : usd->def->model->cloths[o->cloth].name);
+    put_text(file, o->given_name);
     if (!body)
         drape_file_put_text(file, "\nprepend apiSchemas = [\"MaterialBindingAPI\"]");
     if (o->number > 0)
@@ -453,10 +432,10 @@ static void put_stage(usd_state *usd, const drape_frame *frame)
     for (int32_t i = 1; i < usd->objects; i++) {
         const object *o = &usd->object[i];
         begin_mesh(usd, file, o);
-        if (!o->changes) {
+        if (o->number < 0) {
             drape_file_put_text(file, order);
             drape_file_put_text(file, "matrix4d xformOp:transform = ");
-            put_matrix(file, &frame->poses[o->body]);
+            put_matrix(file, pose_of(usd, o, frame));
             drape_file_put_text(file, "\n");
         }
         drape_file_put_text(file, "}\n");
@@ -474,15 +453,14 @@ static drape_status write_next(usd_state *usd, object *o, const drape_frame *fra
     const char *tail = tails[o->number > 0];
     const size_t length = strlen(tail);
     const off_t before = o->file.kept;
-    for (int32_t i = 0; deforms(usd, o) && i < point_count(usd, o); i++)
-        include(o, point_at(usd, o, frame, i));
+    extend(o, frame);
     format_extent(o, extent);
-    if (deforms(usd, o))
+    if (o->deforms)
         drape_file_overwrite(&o->file, o->file.change[BOUNDS].offset, extent, strlen(extent));
     snprintf(code, sizeof code, CODE, usd->code);
     drape_file_overwrite(&o->file, o->file.change[END].offset, code, strlen(code));
     drape_file_put_text(&o->file, "#");
-    put_sample(usd, o, frame, usd->code);
+    put_sample(usd, o, frame);
     drape_file_put_text(&o->file, tail);
     drape_file_overwrite(&o->file, before - (off_t)length, blanks, length + 1);
     return drape_file_keep(&o->file);
@@ -498,7 +476,7 @@ static drape_status usd_write(const drape_export_def *def, void *state, const dr
     usd->code = fabs(code - whole) < 1e-6 ? whole : code;
     for (int32_t i = usd->objects - 1; i >= 0 && !status; i--) {
         object *o = &usd->object[i];
-        if (!o->changes)
+        if (o->number < 0)
             continue;
         if (frame->index > 0) {
             status = write_next(usd, o, frame);
@@ -525,8 +503,8 @@ static void usd_archive(void *state, drape_archive *a)
     drape_archive_double(a, &usd->code);
     for (int32_t i = 0; i < usd->objects && !a->status; i++) {
         object *o = &usd->object[i];
-        drape_archive_same(a, "whether an object of " FILE_NAME " changes", o->changes);
-        if (!o->changes || a->status)
+        drape_archive_same(a, "whether an object of " FILE_NAME " changes", o->number >= 0);
+        if (o->number < 0 || a->status)
             continue;
         drape_archive_bytes(a, o->low, sizeof o->low);
         drape_archive_bytes(a, o->high, sizeof o->high);
