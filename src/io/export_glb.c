@@ -43,15 +43,12 @@
 #define JSON_OFFSET    (DRAPE_GLTF_HEADER + DRAPE_GLTF_CHUNK)
 #define MAX_FRAMES     16384                  /* their weights take 1 GiB */
 #define MAX_BYTES      (UINT32_MAX - 65535.0) /* lengths have 32 bits */
-#define FIXED_SIZE     4096                   /* JSON without the parts of each frame */
-#define PRIMITIVE_SIZE 512
-#define SURFACE_BYTES  3e5 /* of a collider without triangles of its own */
-#define BODY_SIZE      2048
-#define PLACE_SIZE     256 /* ,"translation":[...],"rotation":[...] */
-#define CHANNEL_SIZE   128 /* a channel or a sampler */
-#define LIST_HEAD      12  /* ,"targets":[ and ,"weights":[ */
-#define TARGET_WIDTH   36  /* ,{"POSITION":32769,"NORMAL":32770} */
-#define WEIGHT_WIDTH   2   /* ,0 */
+#define SURFACE_BYTES  3e5                    /* of a collider without triangles of its own */
+#define POSE_SIZE      256                    /* ,"translation":[...],"rotation":[...] */
+#define CHANNEL_SIZE   128                    /* a channel or a sampler */
+#define LIST_HEAD      12                     /* ,"targets":[ and ,"weights":[ */
+#define TARGET_WIDTH   36                     /* ,{"POSITION":32769,"NORMAL":32770} */
+#define WEIGHT_WIDTH   2                      /* ,0 */
 #define LENGTH_WIDTH   10
 #define POSITIONS_SIZE 222 /* the accessor of the positions of a frame, with bounds such as -1.17549435e-38 */
 #define ACCESSOR_SIZE  322 /* and that of the normals */
@@ -63,7 +60,7 @@ typedef struct primitive {
     char *quoted;          /* as a text of JSON */
     uint32_t first, count; /* of the triangles */
     uint32_t filled;       /* those that have their corners already */
-    size_t targets;        /* their list in the JSON */
+    int64_t targets;       /* place of their list in the file */
 } primitive;
 
 /* A node of the scene and its mesh: all cloths in one, a collider that deforms, or a rigid one. */
@@ -73,24 +70,22 @@ typedef struct object {
     uint32_t first_vertex, vertices; /* among those of all that deform, or of all rigid ones */
     uint32_t first_point, points;    /* of what deforms */
     uint32_t first_primitive, primitives;
-    size_t weights; /* their list in the JSON */
-    size_t place;   /* blanks in the JSON for where a rigid one is first */
-    float *moves;   /* (capacity x 7) translation and rotation of a rigid one; NULL: it stays */
+    int64_t weights; /* place of their list in the file */
+    bool moves;      /* it is rigid, and its pose changes */
+    float *pose;     /* (capacity, or 1 if it stays, x 7) translation and rotation of a rigid one */
 } object;
 
-/* Positions of the blanks in the JSON, counted from its beginning. */
-typedef struct blanks {
-    size_t buffer_length, view_length, views, accessors, times, animation;
-} blanks;
+/* Places in the file of what is filled in later: its blanks, and the header of the binary chunk. */
+typedef struct places {
+    int64_t buffer_length, view_length, views, accessors, times, animation, binary;
+} places;
 
 typedef struct glb_state {
     const drape_export_def *def;
     drape_file file;
     uint32_t capacity; /* frames that the blanks are enough for */
     uint32_t frames;   /* complete frames in the file */
-    char *json;        /* of the beginning of the file, until its first frame */
-    size_t json_size, used;
-    blanks at;
+    places at;
     primitive *primitive;
     uint32_t primitives, triangles;
     object *object; /* the cloths, then colliders that deform, then rigid ones */
@@ -320,10 +315,10 @@ static void add_bodies(glb_state *glb, bool rigid)
         glb->rigid_vertices += rigid ? vertices : 0;
         for (uint32_t i = 0; i < o->points; i++)
             glb->node[glb->vertices++] = (int32_t)glb->points++;
-        if (body->moves && rigid) {
-            o->moves = drape_arena_take(def->arena, glb->capacity, 7 * sizeof *o->moves);
-            glb->moving++;
-        }
+        o->moves = body->moves && rigid;
+        glb->moving += o->moves;
+        if (rigid)
+            o->pose = drape_arena_take(def->arena, o->moves ? glb->capacity : 1, 7 * sizeof *o->pose);
     }
 }
 
@@ -356,72 +351,73 @@ static drape_status make_objects(glb_state *glb)
     return drape_arena_status(glb->def->arena);
 }
 
-/* ---- JSON ---- */
+/* ---- The beginning of the file ---- */
 
-static void add(glb_state *glb, const char *format, ...) DRAPE_PRINTF(2, 3);
-static void add(glb_state *glb, const char *format, ...)
+/* Puts blanks and returns where they begin. */
+static int64_t put_blanks(glb_state *glb, size_t count)
 {
-    va_list values;
-    va_start(values, format);
-    glb->used += (size_t)vsnprintf(glb->json + glb->used, glb->json_size - glb->used, format, values);
-    va_end(values);
-}
-
-/* Adds blanks and returns where they begin. */
-static size_t add_blanks(glb_state *glb, size_t count)
-{
-    size_t at = glb->used;
-    memset(glb->json + at, ' ', count);
-    glb->used += count;
+    const int64_t at = drape_file_end(&glb->file);
+    while (count-- > 0)
+        drape_file_put(&glb->file, " ", 1);
     return at;
 }
 
-/* Adds blanks for a list of texts of one width, each for a frame after the first. */
-static size_t add_list(glb_state *glb, size_t width)
+/* Puts blanks for a list of texts of one width, each for a frame after the first. */
+static int64_t put_list(glb_state *glb, size_t width)
 {
-    return add_blanks(glb, LIST_HEAD + glb->capacity * width + 1);
+    return put_blanks(glb, LIST_HEAD + glb->capacity * width + 1);
 }
 
-static void add_views(glb_state *glb)
+/* The beginning of an object of an array. name: as a text of JSON, of any length. */
+static void put_named(drape_file *file, bool first, const char *name)
 {
+    drape_file_put_text(file, first ? "{\"name\":" : ",{\"name\":");
+    drape_file_put_text(file, name);
+}
+
+static void put_views(glb_state *glb)
+{
+    drape_file *file = &glb->file;
     static const char vertices[] =
         ",{\"buffer\":0,\"byteOffset\":%u,\"byteStride\":%d,\"target\":%d,\"byteLength\":";
     const uint32_t triangle_bytes = 12 * glb->triangles;
-    add(glb, "\"buffers\":[{\"byteLength\":");
-    glb->at.buffer_length = add_blanks(glb, LENGTH_WIDTH);
-    add(glb, "}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%u,\"target\":%d}", triangle_bytes,
-        DRAPE_GLTF_INDICES);
-    add(glb, vertices, glb->fixed_bytes, 12, DRAPE_GLTF_VERTICES);
-    glb->at.view_length = add_blanks(glb, LENGTH_WIDTH);
-    add(glb, "}");
+    drape_file_print(file, "\"buffers\":[{\"byteLength\":");
+    glb->at.buffer_length = put_blanks(glb, LENGTH_WIDTH);
+    drape_file_print(file, "}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%u,\"target\":%d}",
+                     triangle_bytes, DRAPE_GLTF_INDICES);
+    drape_file_print(file, vertices, glb->fixed_bytes, 12, DRAPE_GLTF_VERTICES);
+    glb->at.view_length = put_blanks(glb, LENGTH_WIDTH);
+    drape_file_put_text(file, "}");
     if (glb->uv) {
-        add(glb, vertices, triangle_bytes, 8, DRAPE_GLTF_VERTICES);
-        add(glb, "%u}", glb->uv_bytes);
+        drape_file_print(file, vertices, triangle_bytes, 8, DRAPE_GLTF_VERTICES);
+        drape_file_print(file, "%u}", glb->uv_bytes);
     }
     if (glb->objects > glb->deforming) {
-        add(glb, vertices, triangle_bytes + glb->uv_bytes, 12, DRAPE_GLTF_VERTICES);
-        add(glb, "%u}", glb->rigid_bytes);
+        drape_file_print(file, vertices, triangle_bytes + glb->uv_bytes, 12, DRAPE_GLTF_VERTICES);
+        drape_file_print(file, "%u}", glb->rigid_bytes);
     }
-    glb->at.views = add_blanks(glb, TIMES_SIZE);
-    add(glb, "],");
+    glb->at.views = put_blanks(glb, TIMES_SIZE);
+    drape_file_put_text(file, "],");
 }
 
-static void add_accessors(glb_state *glb)
+static void put_accessors(glb_state *glb)
 {
+    drape_file *file = &glb->file;
     char text[ACCESSOR_SIZE], normals[ACCESSOR_SIZE];
     float bounds[6];
-    add(glb, "\"accessors\":[");
+    drape_file_print(file, "\"accessors\":[");
     for (uint32_t i = 0; i < glb->primitives; i++) {
         const primitive *p = &glb->primitive[i];
-        add(glb, "%s%s", i ? "," : "",
-            describe((accessor){.offset = p->first ? 12 * (int64_t)p->first : -1,
-                                .component = DRAPE_GLTF_UINT32,
-                                .count = 3 * p->count,
-                                .width = 1},
-                     text));
+        drape_file_print(file, "%s%s", i ? "," : "",
+                         describe((accessor){.offset = p->first ? 12 * (int64_t)p->first : -1,
+                                             .component = DRAPE_GLTF_UINT32,
+                                             .count = 3 * p->count,
+                                             .width = 1},
+                                  text));
     }
     if (glb->uv)
-        add(glb, ",%s",
+        drape_file_print(
+            file, ",%s",
             describe((accessor){2, -1, DRAPE_GLTF_FLOAT, 2, glb->object[0].vertices, NULL}, text));
     for (uint32_t i = glb->deforming; i < glb->objects; i++) {
         const object *o = &glb->object[i];
@@ -429,76 +425,116 @@ static void add_accessors(glb_state *glb)
         describe_vertices((accessor){rigid_view(glb), 24 * (int64_t)o->first_vertex, DRAPE_GLTF_FLOAT, 3,
                                      o->vertices, bounds},
                           text, normals);
-        add(glb, ",%s,%s", text, normals);
+        drape_file_print(file, ",%s,%s", text, normals);
     }
-    glb->at.accessors = add_blanks(glb, (size_t)glb->capacity * glb->deforming * ACCESSOR_SIZE);
-    glb->at.times = add_blanks(glb, TIMES_SIZE * (1 + (size_t)glb->moving));
-    add(glb, "]");
+    glb->at.accessors = put_blanks(glb, (size_t)glb->capacity * glb->deforming * ACCESSOR_SIZE);
+    glb->at.times = put_blanks(glb, TIMES_SIZE * (1 + (size_t)glb->moving));
+    drape_file_put_text(file, "]");
 }
 
-static void add_meshes(glb_state *glb)
+static void put_meshes(glb_state *glb)
 {
-    add(glb, ",\"meshes\":[");
+    drape_file *file = &glb->file;
+    drape_file_print(file, ",\"meshes\":[");
     for (uint32_t i = 0; i < glb->objects; i++) {
         object *o = &glb->object[i];
         const uint32_t positions = accessor_of(glb, i, 0);
-        add(glb, "%s{\"name\":%s,\"primitives\":[", i ? "," : "", o->name);
+        put_named(file, i == 0, o->name);
+        drape_file_put_text(file, ",\"primitives\":[");
         for (uint32_t k = 0; k < o->primitives; k++) {
-            add(glb, "%s{\"attributes\":{\"POSITION\":%u,\"NORMAL\":%u", k ? "," : "", positions,
-                positions + 1);
+            drape_file_print(file, "%s{\"attributes\":{\"POSITION\":%u,\"NORMAL\":%u", k ? "," : "",
+                             positions, positions + 1);
             if (glb->uv && !o->body)
-                add(glb, ",\"TEXCOORD_0\":%u", glb->primitives);
-            add(glb, "},\"indices\":%u,\"material\":%u", o->first_primitive + k,
-                o->body ? glb->object[0].primitives : k);
+                drape_file_print(file, ",\"TEXCOORD_0\":%u", glb->primitives);
+            drape_file_print(file, "},\"indices\":%u,\"material\":%u", o->first_primitive + k,
+                             o->body ? glb->object[0].primitives : k);
             if (i < glb->deforming)
-                glb->primitive[o->first_primitive + k].targets = add_list(glb, TARGET_WIDTH);
-            add(glb, "}");
+                glb->primitive[o->first_primitive + k].targets = put_list(glb, TARGET_WIDTH);
+            drape_file_put_text(file, "}");
         }
-        add(glb, "]");
+        drape_file_put_text(file, "]");
         if (i < glb->deforming)
-            o->weights = add_list(glb, WEIGHT_WIDTH);
-        add(glb, "}");
+            o->weights = put_list(glb, WEIGHT_WIDTH);
+        drape_file_put_text(file, "}");
     }
-    add(glb, "]");
+    drape_file_put_text(file, "]");
 }
 
-/* Named materials are those of the artist, to be replaced by name: they are light grey. */
-static void make_json(glb_state *glb)
+/* Puts `count` vectors, which are `stride` numbers apart: number node[i], or i if node is NULL. */
+static void put_vectors(glb_state *glb, const float *value, size_t stride, const int32_t *node, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < 3; k++)
+            drape_file_put_float(&glb->file, value[stride * (node ? (size_t)node[i] : i) + k]);
+}
+
+/* Header and JSON, with blanks for what is not known yet, and what of the binary chunk all frames share.
+ * Named materials are those of the artist, to be replaced by name: they are light grey. Rigid nodes are where
+ * the first frame has them. */
+static void put_head(glb_state *glb)
 {
     static const char material[] =
-        "%s{\"name\":%s,\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[%s,1],"
+        ",\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[%s,1],"
         "\"metallicFactor\":0,\"roughnessFactor\":0.85}}";
-    add(glb,
-        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape %s\"},\"scene\":0,\"scenes\":[{\"nodes\":[",
-        drape_version());
+    drape_file *file = &glb->file;
+    drape_file_put_text(file, DRAPE_GLTF_MAGIC);
+    drape_file_put_word(file, DRAPE_GLTF_VERSION);
+    drape_file_put_word(file, 0); /* the length of the file, and that of the JSON */
+    drape_file_put_word(file, 0);
+    drape_file_put_text(file, DRAPE_GLTF_JSON);
+    drape_file_print(file, "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape %s\"},", drape_version());
+    drape_file_put_text(file, "\"scene\":0,\"scenes\":[{\"nodes\":[");
     for (uint32_t i = 0; i < glb->objects; i++)
-        add(glb, "%s%u", i ? "," : "", i);
-    add(glb, "]}],\"nodes\":[");
+        drape_file_print(file, "%s%u", i ? "," : "", i);
+    drape_file_put_text(file, "]}],\"nodes\":[");
     for (uint32_t i = 0; i < glb->objects; i++) {
-        add(glb, "%s{\"name\":%s,\"mesh\":%u", i ? "," : "", glb->object[i].name, i);
-        glb->object[i].place = add_blanks(glb, i < glb->deforming ? 0 : PLACE_SIZE);
-        add(glb, "}");
+        const float *p = glb->object[i].pose;
+        put_named(file, i == 0, glb->object[i].name);
+        drape_file_print(file, ",\"mesh\":%u", i);
+        if (i >= glb->deforming) {
+            const int64_t end = drape_file_end(file) + POSE_SIZE;
+            drape_file_print(file, ",\"translation\":[%.9g,%.9g,%.9g]", p[0], p[1], p[2]);
+            drape_file_print(file, ",\"rotation\":[%.9g,%.9g,%.9g,%.9g]", p[3], p[4], p[5], p[6]);
+            put_blanks(glb, (size_t)(end - drape_file_end(file)));
+        }
+        drape_file_put_text(file, "}");
     }
-    add(glb, "],\"materials\":[");
-    for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        add(glb, material, p ? "," : "", glb->primitive[p].quoted,
-            *glb->primitive[p].name ? "0.8,0.8,0.8" : "0.55,0.16,0.13");
-    if (glb->def->body_count > 0)
-        add(glb, material, ",", "\"collider\"", "0.35,0.37,0.4");
-    add(glb, "],");
-    add_views(glb);
-    add_accessors(glb);
-    add_meshes(glb);
-    glb->at.animation = add_blanks(glb, (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_SIZE);
-    add(glb, "}");
-    add_blanks(glb, 3 - (glb->used + 3) % 4);
-    glb->json_size = glb->used;
+    drape_file_put_text(file, "],\"materials\":[");
+    for (uint32_t p = 0; p < glb->object[0].primitives; p++) {
+        put_named(file, p == 0, glb->primitive[p].quoted);
+        drape_file_print(file, material, *glb->primitive[p].name ? "0.8,0.8,0.8" : "0.55,0.16,0.13");
+    }
+    if (glb->def->body_count > 0) {
+        put_named(file, false, "\"collider\"");
+        drape_file_print(file, material, "0.35,0.37,0.4");
+    }
+    drape_file_put_text(file, "],");
+    put_views(glb);
+    put_accessors(glb);
+    put_meshes(glb);
+    glb->at.animation = put_blanks(glb, (3 + glb->deforming + 4 * (size_t)glb->moving) * CHANNEL_SIZE);
+    drape_file_put_text(file, "}");
+    put_blanks(glb, 3 - (size_t)(drape_file_end(file) + 3) % 4);
+    glb->at.binary = drape_file_end(file);
+    drape_file_overwrite_word(file, DRAPE_GLTF_HEADER, (uint32_t)glb->at.binary - JSON_OFFSET);
+    drape_file_put_word(file, 0);
+    drape_file_put(file, DRAPE_GLTF_BIN, 4); /* with its terminating 0 */
+    drape_file_declare(file, 0, (size_t)drape_file_end(file));
+    for (size_t i = 0; i < 3 * (size_t)glb->triangles; i++)
+        drape_file_put_word(file, glb->corner[i]);
+    for (size_t i = 0; glb->uv && i < glb->object[0].vertices; i++) {
+        drape_file_put_float(file, glb->uv[i] ? (float)glb->uv[i][0] : 0);
+        drape_file_put_float(file, glb->uv[i] ? (float)(1 - glb->uv[i][1]) : 0);
+    }
+    for (uint32_t i = glb->deforming; i < glb->objects; i++)
+        for (size_t part = 0; part < 6; part += 3)
+            put_vectors(glb, glb->object[i].body->vertex + part, 6, NULL, glb->object[i].vertices);
 }
 
 /* ---- Opening ---- */
 
 /* Bytes of JSON that a frame takes. */
-static double frame_room(double objects, double primitives)
+static double frame_json(double objects, double primitives)
 {
     return objects * (ACCESSOR_SIZE + WEIGHT_WIDTH) + primitives * TARGET_WIDTH;
 }
@@ -515,7 +551,7 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         primitives += mesh->faces.material_count;
     }
     double bytes = 12.0 * surface->triangle_count + 24 * vertices * frames + 4 * frames * frames +
-                   frames * frame_room(1 + def->model->collider_count, primitives);
+                   frames * frame_json(1 + def->model->collider_count, primitives);
     for (int32_t i = 0; i < def->model->collider_count; i++)
         bytes += SURFACE_BYTES + 84.0 * def->model->colliders[i].shape.triangle_count + 28 * frames;
     if (frames <= MAX_FRAMES && bytes <= MAX_BYTES)
@@ -536,12 +572,6 @@ static drape_status glb_open(const drape_export_def *def, void *state)
     drape_status status = make_objects(glb);
     if (status)
         return status;
-    glb->json_size = FIXED_SIZE + (size_t)glb->capacity * (size_t)frame_room(glb->objects, glb->primitives);
-    for (uint32_t p = 0; p < glb->object[0].primitives; p++)
-        glb->json_size += PRIMITIVE_SIZE + strlen(glb->primitive[p].quoted);
-    for (uint32_t i = 1; i < glb->objects; i++)
-        glb->json_size += BODY_SIZE + 2 * strlen(glb->object[i].name);
-    glb->json = drape_arena_take(arena, glb->json_size, 1);
     const size_t count = 3 * (size_t)glb->points;
     glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
     for (int part = 0; part < 2; part++) {
@@ -549,40 +579,27 @@ static drape_status glb_open(const drape_export_def *def, void *state)
         glb->moved[part] = drape_arena_take(arena, count, sizeof **glb->moved);
     }
     glb->times = drape_arena_take(arena, glb->capacity, sizeof *glb->times);
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
-    make_json(glb);
-    return drape_export_open(def, FILE_NAME, &glb->file);
+    status = drape_arena_status(arena);
+    return status ? status : drape_export_open(def, FILE_NAME, &glb->file);
 }
 
-/* ---- Changes to the beginning of the file ---- */
+/* ---- What frames fill in ---- */
 
-/* Overwrites bytes of the JSON: in memory before the first frame, with which the file appears, and in the
- * file after it. */
-static void overwrite(glb_state *glb, size_t at, const char *text, size_t size)
-{
-    if (glb->frames == 0)
-        memcpy(glb->json + at, text, size);
-    else
-        drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, size);
-}
-
-static void fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
-static void fill(glb_state *glb, size_t at, const char *format, ...)
+static void fill(glb_state *glb, int64_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
+static void fill(glb_state *glb, int64_t at, const char *format, ...)
 {
     char text[2 * TIMES_SIZE];
     va_list values;
     va_start(values, format);
     const int length = vsnprintf(text, sizeof text, format, values);
     va_end(values);
-    overwrite(glb, at, text, (size_t)length);
+    drape_file_overwrite(&glb->file, (off_t)at, text, (size_t)length);
 }
 
-/* Fills in the item of this frame in a list of the JSON; with the first item also the key and the brackets.
- */
-static void fill_list(glb_state *glb, size_t list, size_t width, const char *key, const char *text)
+/* Fills in the item of this frame in a list of the JSON; with the first one also the key and the brackets. */
+static void fill_list(glb_state *glb, int64_t list, int64_t width, const char *key, const char *text)
 {
-    const size_t target = glb->frames - 1;
+    const int64_t target = (int64_t)glb->frames - 1;
     if (target == 0) {
         fill(glb, list + LIST_HEAD + glb->capacity * width, "]");
         fill(glb, list, ",\"%s\":[%s", key, text);
@@ -591,15 +608,15 @@ static void fill_list(glb_state *glb, size_t list, size_t width, const char *key
     }
 }
 
-/* Writes all lengths as they are now. positions: bytes of positions and normals. */
-static void write_lengths(glb_state *glb, uint32_t positions)
+/* Fills in all lengths as they are with so many frames. */
+static void fill_lengths(glb_state *glb, uint32_t frames)
 {
-    const uint32_t binary = JSON_OFFSET + (uint32_t)glb->json_size,
-                   size = (uint32_t)drape_file_end(&glb->file), length = size - binary - DRAPE_GLTF_CHUNK;
-    drape_file_overwrite_word(&glb->file, binary, length);
-    drape_file_overwrite_word(&glb->file, 8, size);
+    const uint32_t size = (uint32_t)drape_file_end(&glb->file),
+                   length = size - (uint32_t)glb->at.binary - DRAPE_GLTF_CHUNK;
+    drape_file_overwrite_word(&glb->file, (off_t)glb->at.binary, length);
+    drape_file_overwrite_word(&glb->file, DRAPE_GLTF_HEADER - 4, size);
     fill(glb, glb->at.buffer_length, "%*u", LENGTH_WIDTH, length);
-    fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, positions);
+    fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, frames * glb->frame_bytes);
 }
 
 /* ---- Frames ---- */
@@ -636,7 +653,8 @@ static void fill_frame(glb_state *glb)
     for (uint32_t number = 0; number < glb->deforming; number++) {
         const object *o = &glb->object[number];
         const uint32_t positions = accessor_of(glb, number, glb->frames);
-        const size_t at = glb->at.accessors + (glb->frames * (size_t)glb->deforming + number) * ACCESSOR_SIZE;
+        const int64_t at =
+            glb->at.accessors + (glb->frames * (int64_t)glb->deforming + number) * ACCESSOR_SIZE;
         float bounds[6];
         char text[ACCESSOR_SIZE], normals[ACCESSOR_SIZE];
         find_bounds(glb->moved[0] + 3 * (size_t)o->first_point, 3, o->points, bounds);
@@ -655,14 +673,6 @@ static void fill_frame(glb_state *glb)
     }
 }
 
-/* Puts `count` vectors, which are `stride` numbers apart: number node[i], or i if node is NULL. */
-static void put_vectors(glb_state *glb, const float *value, size_t stride, const int32_t *node, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        for (size_t k = 0; k < 3; k++)
-            drape_file_put_float(&glb->file, value[stride * (node ? (size_t)node[i] : i) + k]);
-}
-
 static void put_frame(glb_state *glb)
 {
     for (uint32_t i = 0; i < glb->deforming; i++)
@@ -671,15 +681,14 @@ static void put_frame(glb_state *glb)
                         glb->object[i].vertices);
 }
 
-/* Keeps translation and rotation of each rigid object in this frame; those of the first frame are also
- * written into the JSON. A rotation is a quaternion x, y, z, w; of its two signs that is taken which is
- * nearer to the frame before. */
-static void keep_places(glb_state *glb, const drape_frame *frame)
+/* Keeps translation and rotation of each rigid object in this frame. A rotation is a quaternion x, y, z, w;
+ * of its two signs that is taken which is nearer to the frame before. */
+static void keep_poses(glb_state *glb, const drape_frame *frame)
 {
     for (uint32_t i = glb->deforming; i < glb->objects; i++) {
         const object *o = &glb->object[i];
         const drape_collider_pose *pose = &frame->poses[o->body - glb->def->bodies];
-        float first[7], *p = o->moves ? o->moves + 7 * (size_t)glb->frames : first;
+        float *p = o->pose + 7 * (size_t)glb->frames;
         double q[4] = {1, 0, 0, 0}, sign = 1;
         if (!o->moves && glb->frames > 0)
             continue;
@@ -693,67 +702,33 @@ static void keep_places(glb_state *glb, const drape_frame *frame)
             p[3 + k] = (float)(sign * q[1 + k]);
         }
         p[6] = (float)(sign * q[0]);
-        if (glb->frames == 0)
-            fill(glb, o->place, ",\"translation\":[%.9g,%.9g,%.9g],\"rotation\":[%.9g,%.9g,%.9g,%.9g]", p[0],
-                 p[1], p[2], p[3], p[4], p[5], p[6]);
     }
 }
 
-/* The file appears with its first frame, since a file without positions would not be valid. */
-static drape_status write_first(glb_state *glb)
-{
-    const uint32_t length = glb->fixed_bytes + glb->frame_bytes;
-    fill_frame(glb);
-    fill(glb, glb->at.buffer_length, "%*u", LENGTH_WIDTH, length);
-    fill(glb, glb->at.view_length, "%*u", LENGTH_WIDTH, glb->frame_bytes);
-
-    drape_file_put_text(&glb->file, DRAPE_GLTF_MAGIC);
-    drape_file_put_word(&glb->file, DRAPE_GLTF_VERSION);
-    drape_file_put_word(&glb->file, (uint32_t)(JSON_OFFSET + glb->json_size + DRAPE_GLTF_CHUNK + length));
-    drape_file_put_word(&glb->file, (uint32_t)glb->json_size);
-    drape_file_put_text(&glb->file, DRAPE_GLTF_JSON);
-    drape_file_put(&glb->file, glb->json, glb->json_size);
-    drape_file_put_word(&glb->file, length);
-    drape_file_put(&glb->file, DRAPE_GLTF_BIN, 4); /* with its terminating 0 */
-    drape_file_declare(&glb->file, 0, (size_t)drape_file_end(&glb->file));
-    for (size_t i = 0; i < 3 * (size_t)glb->triangles; i++)
-        drape_file_put_word(&glb->file, glb->corner[i]);
-    for (size_t i = 0; glb->uv && i < glb->object[0].vertices; i++) {
-        drape_file_put_float(&glb->file, glb->uv[i] ? (float)glb->uv[i][0] : 0);
-        drape_file_put_float(&glb->file, glb->uv[i] ? (float)(1 - glb->uv[i][1]) : 0);
-    }
-    for (uint32_t i = glb->deforming; i < glb->objects; i++)
-        for (size_t part = 0; part < 6; part += 3)
-            put_vectors(glb, glb->object[i].body->vertex + part, 6, NULL, glb->object[i].vertices);
-    put_frame(glb);
-    for (int part = 0; part < 2; part++)
-        memcpy(glb->base[part], glb->moved[part], 3 * (size_t)glb->points * sizeof **glb->base);
-    return drape_file_publish(&glb->file);
-}
-
-/* The times of an animation must strictly increase, in float32. */
+/* The file appears with its first frame, since a file without positions would not be valid. The times of an
+ * animation must strictly increase, in float32. */
 static drape_status glb_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     glb_state *glb = state;
+    const bool first = glb->frames == 0;
     if (glb->frames == glb->capacity)
         return drape_fail(def->ctx, DRAPE_E_FILE,
                           "\"%.300s/%.200s\" has room for %u frames, those of the scene's duration",
                           drape_folder_path(def->folder), glb->file.path, glb->capacity);
     float *time = &glb->times[glb->frames];
     *time = (float)frame->time;
-    if (glb->frames > 0 && !(*time > time[-1]))
+    if (!first && !(*time > time[-1]))
         *time = nextafterf(time[-1], FLT_MAX);
-    keep_places(glb, frame);
+    keep_poses(glb, frame);
     find_differences(glb, frame);
-    drape_status status;
-    if (glb->frames == 0) {
-        status = write_first(glb);
-    } else {
-        put_frame(glb);
-        write_lengths(glb, (glb->frames + 1) * glb->frame_bytes);
-        fill_frame(glb);
-        status = drape_file_keep(&glb->file);
-    }
+    if (first)
+        put_head(glb);
+    put_frame(glb);
+    fill_lengths(glb, glb->frames + 1);
+    fill_frame(glb);
+    for (int part = 0; part < 2 && first; part++)
+        memcpy(glb->base[part], glb->moved[part], 3 * (size_t)glb->points * sizeof **glb->base);
+    const drape_status status = first ? drape_file_publish(&glb->file) : drape_file_keep(&glb->file);
     glb->frames += !status;
     return status;
 }
@@ -772,7 +747,7 @@ static void fill_accessors(glb_state *glb)
          describe((accessor){view, 4 * (int64_t)n, DRAPE_GLTF_FLOAT, 1, n * (n - 1), NULL}, second));
     for (uint32_t i = 0; i < glb->moving; i++) {
         const int64_t offset = 4 * (int64_t)n * (n + 7 * i);
-        fill(glb, glb->at.times + (1 + i) * (size_t)TIMES_SIZE, ",%s,%s",
+        fill(glb, glb->at.times + (1 + (int64_t)i) * TIMES_SIZE, ",%s,%s",
              describe((accessor){view, offset, DRAPE_GLTF_FLOAT, 3, n, NULL}, first),
              describe((accessor){view, offset + 12 * n, DRAPE_GLTF_FLOAT, 4, n, NULL}, second));
     }
@@ -783,7 +758,7 @@ static void fill_accessors(glb_state *glb)
 static void fill_channels(glb_state *glb)
 {
     const uint32_t times = accessor_of(glb, 0, glb->frames);
-    size_t at = glb->at.animation;
+    int64_t at = glb->at.animation;
     uint32_t sampler = 1;
     fill(glb, at, ",\"animations\":[{\"name\":\"run\",\"channels\":[");
     at += CHANNEL_SIZE;
@@ -815,13 +790,13 @@ static drape_status glb_close(const drape_export_def *def, void *state)
         for (uint32_t target = 1; target < glb->frames; target++)
             drape_file_put_float(&glb->file, frame == target);
     for (uint32_t i = 0; i < glb->objects; i++) {
-        const float *moves = glb->object[i].moves;
-        for (uint32_t k = 0; moves && k < 3 * glb->frames; k++)
-            drape_file_put_float(&glb->file, moves[k / 3 * 7 + k % 3]);
-        for (uint32_t k = 0; moves && k < 4 * glb->frames; k++)
-            drape_file_put_float(&glb->file, moves[k / 4 * 7 + 3 + k % 4]);
+        const object *o = &glb->object[i];
+        for (uint32_t k = 0; o->moves && k < 3 * glb->frames; k++)
+            drape_file_put_float(&glb->file, o->pose[k / 3 * 7 + k % 3]);
+        for (uint32_t k = 0; o->moves && k < 4 * glb->frames; k++)
+            drape_file_put_float(&glb->file, o->pose[k / 4 * 7 + 3 + k % 4]);
     }
-    write_lengths(glb, glb->frames * glb->frame_bytes);
+    fill_lengths(glb, glb->frames);
     fill_accessors(glb);
     fill_channels(glb);
     return drape_file_keep(&glb->file);
@@ -845,9 +820,15 @@ static void glb_archive(void *state, drape_archive *a)
     glb->frames = (uint32_t)frames;
     drape_archive_bytes(a, glb->base[0], 3 * (size_t)glb->points * sizeof **glb->base);
     drape_archive_bytes(a, glb->base[1], 3 * (size_t)glb->points * sizeof **glb->base);
-    for (uint32_t i = 0; i < glb->objects; i++)
-        if (glb->object[i].moves)
-            drape_archive_bytes(a, glb->object[i].moves, glb->frames * 7 * sizeof *glb->object[i].moves);
+    drape_archive_bytes(a, &glb->at, sizeof glb->at);
+    for (uint32_t i = 0; i < glb->primitives; i++)
+        drape_archive_int64(a, &glb->primitive[i].targets);
+    for (uint32_t i = 0; i < glb->objects; i++) {
+        const object *o = &glb->object[i];
+        drape_archive_int64(a, &glb->object[i].weights);
+        if (o->moves)
+            drape_archive_bytes(a, o->pose, glb->frames * 7 * sizeof *o->pose);
+    }
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
 }
 
