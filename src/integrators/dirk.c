@@ -119,12 +119,11 @@ static bool matrix_is_due(void *user)
 
 /* Factors for another gamma make corrections that are too long or too short: their mean over all waves is
  * corrected, as by SUNDIALS. */
-static int solve(SUNLinearSolver linear_solver, SUNMatrix matrix, N_Vector out, N_Vector in,
-                 sunrealtype tolerance)
+static int correct(SUNLinearSolver linear_solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                   sunrealtype tolerance)
 {
-    const drape_sun_linear *linear = linear_solver->content;
     int status = drape_first_order_solve_rhs(linear_solver, matrix, out, in, tolerance);
-    N_VScale(2 / (1 + ratio_of(linear->owner)), out, out);
+    N_VScale(2 / (1 + ratio_of(linear_solver->content)), out, out);
     return status;
 }
 
@@ -166,7 +165,6 @@ static int predict(sunrealtype t, N_Vector predicted, void *user)
 static bool create_arkode(drape_first_order *f)
 {
     dirk_state *s = (dirk_state *)f;
-    f->linear->shell.solver->ops->solve = solve;
     f->newton.mass = f->mass;
     f->newton.gamma = ARKStepGetCurrentGamma;
     f->newton.is_due = matrix_is_due;
@@ -185,7 +183,7 @@ static bool create_arkode(drape_first_order *f)
     DRAPE_ARKODE_QUIET(m);
     return !ARKStepSetUserData(m, f) && !ARKStepSVtolerances(m, 0, f->weights) &&
            !ARKStepSetTableNum(m, methods[order_of(s)].table, ARKODE_ERK_NONE) &&
-           !ARKStepSetLinearSolver(m, f->linear->shell.solver, f->linear->shell.matrix) &&
+           !ARKStepSetLinearSolver(m, f->shell.solver, f->shell.matrix) &&
            !ARKStepSetLinSysFn(m, system_matrix) && !ARKStepSetLinearSolutionScaling(m, SUNFALSE) &&
            !ARKStepSetNonlinearSolver(m, f->newton.solver) && drape_sun_newton_set_test(&f->newton) &&
            !ARKStepSetDeduceImplicitRhs(m, SUNTRUE) && !ARKStepSetStagePredictFn(m, predict) &&
@@ -381,6 +379,7 @@ static const drape_first_order_solver solver = {
     .param_count = PARAM_COUNT,
     .loose_order = LOOSE_ORDER,
     .tight_order = TIGHT_ORDER,
+    .correct = correct,
     .create = create_arkode,
     .free = ARKStepFree,
     .destroy_vectors = destroy_vectors,

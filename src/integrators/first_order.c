@@ -92,32 +92,10 @@ double drape_first_order_norm(const drape_first_order *s, N_Vector vector)
 
 /* ---- Jacobian ---- */
 
-/* Takes the matrices for the system's present pattern. */
-static drape_status renew_matrices(drape_first_order *s)
+/* D (nonzeros); NULL if nothing dissipates. */
+static double *damping_of(const drape_first_order *s)
 {
-    const drape_pattern *pattern = drape_system_pattern(s->system);
-    if (s->dissipated) {
-        drape_arena_release(s->arena, s->damping);
-        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
-        if (!s->damping)
-            return DRAPE_E_MEMORY;
-    }
-    return drape_sun_linear_extend_pattern(s->linear, pattern);
-}
-
-/* Contact may couple new nodes. */
-static drape_status extend_pattern(drape_first_order *s, const drape_point *point)
-{
-    bool changed;
-    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
-    s->linear->stale |= changed;
-    return !status && s->linear->stale ? renew_matrices(s) : status;
-}
-
-/* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
-static double jacobian_clock(const drape_first_order *s)
-{
-    return drape_system_clock(s->system) - s->linear->factor_seconds;
+    return s->linear->more[0];
 }
 
 /* Whether the next matrix is the symmetric part. If the iteration failed with a new symmetric matrix, exact
@@ -140,36 +118,36 @@ static bool choose_symmetric(drape_first_order *s)
 
 int drape_first_order_jacobian(drape_first_order *s, double t, double cj, const double *y)
 {
-    double start = jacobian_clock(s);
+    const double start = drape_system_matrix_clock(s->linear);
     drape_point point = place(s, t, y);
     point.weight = cj;
     point.contact = s->newton.bounds ? DRAPE_CONTACT_GAUSS_NEWTON : DRAPE_CONTACT_EXACT;
-    s->failure = extend_pattern(s, &point);
+    s->failure = drape_system_matrix_follow(s->linear, &point);
     if (s->failure)
         return -1;
-    drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
     if (!s->newton.bounds)
         s->symmetric = choose_symmetric(s);
     if (s->newton.bounds || s->symmetric)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
-    if (s->damping)
-        drape_system_damping(s->system, &point, s->damping);
+    if (damping_of(s))
+        drape_system_damping(s->system, &point, damping_of(s));
     s->factored_cj = cj;
     drape_sun_newton_forget(&s->newton);
     s->work.jacobians++;
-    s->work.jacobian_seconds += jacobian_clock(s) - start;
+    s->work.jacobian_seconds += drape_system_matrix_clock(s->linear) - start;
     return 0;
 }
 
-/* ---- Solve ---- */
+/* ---- Factor and solve ---- */
 
 /* reduced += D r */
 static void add_damping(const drape_first_order *s, const double *r)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
+    const double *damping = damping_of(s);
     const size_t own = (size_t)s->n * sizeof *r;
-    if (!s->damping)
+    if (!damping)
         return;
     const double *from = s->ranks ? s->with_copies[0] : r;
     double *to = s->ranks ? s->with_copies[1] : s->reduced;
@@ -180,16 +158,23 @@ static void add_damping(const drape_first_order *s, const double *r)
     }
     for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            to[drape_pattern_row(p, j, k)] += s->damping[k] * from[j];
+            to[drape_pattern_row(p, j, k)] += damping[k] * from[j];
     if (s->ranks)
         memcpy(s->reduced, to, own);
+}
+
+static int factor(SUNLinearSolver solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    const drape_first_order *s = solver->content;
+    return drape_system_matrix_factor(s->linear, false);
 }
 
 /* With r2 + c_j M r1 in `reduced`. r1 and dv may be the same. */
 static int solve_reduced(drape_first_order *s, const double *r1, double *dx, double *dv)
 {
     add_damping(s, r1);
-    drape_status status = drape_sun_linear_solve(s->linear, s->reduced, dx);
+    drape_status status = drape_system_matrix_solve(s->linear, s->reduced, dx);
     for (int64_t i = 0; i < s->n; i++)
         dv[i] = s->factored_cj * dx[i] - r1[i];
     return status;
@@ -199,8 +184,7 @@ int drape_first_order_solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector o
                             sunrealtype tolerance)
 {
     (void)matrix, (void)tolerance;
-    const drape_sun_linear *linear = solver->content;
-    drape_first_order *s = linear->owner;
+    drape_first_order *s = solver->content;
     const double *r1 = N_VGetArrayPointer(in), *r2 = r1 + s->n;
     double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
     for (int64_t i = 0; i < s->n; i++)
@@ -213,8 +197,7 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
                                 sunrealtype tolerance)
 {
     (void)matrix, (void)tolerance;
-    const drape_sun_linear *linear = solver->content;
-    drape_first_order *s = linear->owner;
+    drape_first_order *s = solver->content;
     const double *b1 = N_VGetArrayPointer(in), *b2 = b1 + s->n, cj = s->factored_cj;
     double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
     for (int64_t i = 0; i < s->n; i++) {
@@ -502,11 +485,8 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
         s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
     for (int k = 0; s->ranks && k < 2; k++)
         s->with_copies[k] = drape_arena_take(s->arena, (size_t)s->model->block_count, 3 * sizeof(double));
-    if (s->model->has_dissipation) {
-        s->damping =
-            drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
+    if (s->model->has_dissipation)
         s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
-    }
     drape_reserve reserve = {.used = false};
     drape_status status = drape_arena_status(arena);
     if (!status)
@@ -534,12 +514,13 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
         }
     }
     if (!status && s->n > 0)
-        status = drape_sun_linear_create(
-            arena, s->sun, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
-            drape_system_pattern(s->system), drape_system_pool(s->system),
-            drape_system_cancel_flag(s->system), &s->linear);
+        status = drape_system_matrix_create(
+            arena, system, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
+            s->model->has_dissipation, 0, &s->linear);
+    if (!status && s->n > 0)
+        status = drape_ranks_agree(
+            s->ranks, ctx, drape_sun_shell_create(ctx, s->sun, s, factor, solver->correct, &s->shell));
     if (!status && s->n > 0) {
-        s->linear->owner = s;
         s->linear->tolerance = LINEAR_TOLERANCE;
         bool created = drape_sun_newton_create(&s->newton, s->y, 2 * s->n, s->ranks, s->sun);
         created = drape_ranks_all(s->ranks, created) && solver->create(s);
@@ -560,7 +541,8 @@ void drape_first_order_destroy(void **state)
     if (s->solver && s->solver->destroy_vectors)
         s->solver->destroy_vectors(s);
     drape_sun_newton_free(&s->newton);
-    drape_sun_linear_destroy(&s->linear);
+    drape_sun_shell_destroy(&s->shell);
+    drape_system_matrix_destroy(&s->linear);
     N_VDestroy(s->y);
     N_VDestroy(s->rate);
     N_VDestroy(s->weights);
@@ -580,8 +562,8 @@ drape_work drape_first_order_work(const void *state)
 /* Its factors are kept between steps, with c_j and D. */
 static void archive_factors(drape_first_order *s, drape_archive *a)
 {
-    if (drape_archive_has_read(a) && drape_system_pattern(s->system) != s->linear->pattern)
-        drape_archive_note(a, renew_matrices(s));
+    if (drape_archive_has_read(a))
+        drape_archive_note(a, drape_system_matrix_renew(s->linear));
     drape_archive_double(a, &s->factored_cj);
     drape_archive_bool(a, &s->symmetric);
     drape_archive_int64(a, &s->exact_remaining);
@@ -589,9 +571,9 @@ static void archive_factors(drape_first_order *s, drape_archive *a)
     if (a->reading && !(s->exact_span >= 1 && s->exact_span <= MAX_EXACT_SPAN && s->exact_remaining >= 0 &&
                         s->exact_remaining <= s->exact_span))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an impossible number of exact matrices");
-    if (s->damping && drape_archive_good(a))
-        drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
-    drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
+    if (damping_of(s) && drape_archive_good(a))
+        drape_archive_doubles(a, damping_of(s), (size_t)s->linear->pattern->nonzeros);
+    drape_system_matrix_archive(s->linear, a, s->factored_cj != 0);
 }
 
 void drape_first_order_archive(void *state, drape_archive *a)
@@ -625,5 +607,5 @@ size_t drape_first_order_bytes(const void *state)
     if (s->n == 0)
         return 0;
     const size_t vectors = 8 + (size_t)s->solver->vectors(s); /* allocated here; by the library */
-    return 2 * (size_t)s->n * vectors * sizeof(double) + drape_sun_linear_bytes(s->linear);
+    return 2 * (size_t)s->n * vectors * sizeof(double) + drape_system_matrix_bytes(s->linear);
 }

@@ -33,7 +33,7 @@
 #include "integrators/integrator.h"
 #include "integrators/sun_newton.h"
 #include "integrators/tolerance.h"
-#include "solvers/sun_linear.h"
+#include "solvers/sun_shell.h"
 
 #include <nvector/nvector_serial.h>
 
@@ -97,7 +97,10 @@ typedef struct drape_first_order_solver {
     size_t state_size;            /* of the state of the entry */
     int param_count;              /* of the entry */
     int loose_order, tight_order; /* defaults of the order: for rtol >= DRAPE_FIRST_ORDER_TIGHT, and below */
-    /* Creates f->memory with all settings, from f->y and f->rate; attaches f->linear and f->newton. */
+    /* Solves for a correction of Newton's iteration: drape_first_order_solve, or a function that calls
+     * drape_first_order_solve_rhs. */
+    int (*correct)(SUNLinearSolver, SUNMatrix, N_Vector, N_Vector, sunrealtype);
+    /* Creates f->memory with all settings, from f->y and f->rate; attaches f->shell and f->newton. */
     bool (*create)(drape_first_order *f);
     void (*free)(void **memory);                   /* of the library */
     void (*destroy_vectors)(drape_first_order *f); /* of the entry; NULL: it has none */
@@ -127,11 +130,11 @@ struct drape_first_order {
     SUNContext sun;
     void *memory;                       /* of the library */
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
-    drape_sun_linear *linear;
+    drape_system_matrix *linear;        /* and D; NULL without free nodes */
+    drape_sun_shell shell;              /* of the solve with it */
     drape_sun_newton newton;
     double *mass;             /* of the free DOFs */
     double *x, *v, *g;        /* nodes: where the residual was evaluated last; g there */
-    double *damping;          /* D (nonzeros); NULL if nothing dissipates */
     const drape_ranks *ranks; /* the model's */
     double *with_copies[2];   /* (pattern.n) scratch of products of D, if there are ranks */
     double *reduced;          /* right-hand side of the reduced system (n) */

@@ -49,7 +49,7 @@ static bool configure(drape_first_order *s)
     DRAPE_IDA_QUIET(s->memory);
     return !IDAInit(s->memory, residual, 0, s->y, s->rate) && !IDASetUserData(s->memory, s) &&
            !IDASVtolerances(s->memory, 0, s->weights) &&
-           !IDASetLinearSolver(s->memory, s->linear->shell.solver, s->linear->shell.matrix) &&
+           !IDASetLinearSolver(s->memory, s->shell.solver, s->shell.matrix) &&
            !IDASetNonlinearSolver(s->memory, s->newton.solver) && drape_sun_newton_set_test(&s->newton) &&
            !IDASetJacFn(s->memory, jacobian) &&
            !IDASetMaxOrd(s->memory, (int)s->values[DRAPE_FIRST_ORDER_ORDER]) &&
@@ -60,7 +60,6 @@ static bool configure(drape_first_order *s)
 
 static bool create_ida(drape_first_order *s)
 {
-    s->linear->shell.solver->ops->solve = drape_first_order_solve;
     s->memory = IDACreate(s->sun);
     if (!s->memory || !configure(s))
         return false;
@@ -127,6 +126,7 @@ static const drape_first_order_solver solver = {
     .param_count = DRAPE_FIRST_ORDER_OWN,
     .loose_order = LOOSE_ORDER,
     .tight_order = TIGHT_ORDER,
+    .correct = drape_first_order_solve,
     .create = create_ida,
     .free = IDAFree,
     .begin = begin,

@@ -274,12 +274,6 @@ static drape_status evaluate_stages(radau_state *s, double h)
     return DRAPE_OK;
 }
 
-/* Excludes contact and factorisation, which are timed separately. */
-static double jacobian_clock(const radau_state *s)
-{
-    return drape_system_clock(s->system) - s->matrix.linear->factor_seconds;
-}
-
 /* Where K and D are evaluated: at the last polynomial's extrapolation to the middle of the step, as K at the
  * beginning is twice as far from K at the end; but at the beginning if there is none, or if it crosses
  * something. */
@@ -311,14 +305,14 @@ static drape_point choose_matrix_point(radau_state *s, double h)
 /* K and D, unless they are kept, and factors for h. */
 static drape_status prepare_matrix(radau_state *s, double h)
 {
-    const double start = jacobian_clock(s);
+    const double start = drape_system_matrix_clock(s->matrix.linear);
     if (!s->have_matrix) {
         drape_point point = choose_matrix_point(s, h);
         if (s->bounds)
             point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
         drape_status status = drape_radau_matrix_evaluate(&s->matrix, &point);
         s->work.jacobians++;
-        s->work.jacobian_seconds += jacobian_clock(s) - start;
+        s->work.jacobian_seconds += drape_system_matrix_clock(s->matrix.linear) - start;
         if (status)
             return status;
         s->have_matrix = s->current = true;

@@ -25,16 +25,15 @@ static complex_number conjugate(complex_number a)
 
 /* ---- Memory ---- */
 
-static drape_status take_values(drape_radau_matrix *m)
+static double *stiffness_of(const drape_radau_matrix *m)
 {
-    const size_t nonzeros = (size_t)m->linear->pattern->nonzeros;
-    drape_arena_free(&m->values);
-    m->damping = NULL;
-    m->stiffness = drape_arena_take(&m->values, nonzeros, sizeof *m->stiffness);
-    if (drape_system_model(m->system)->has_dissipation)
-        m->damping = drape_arena_take(&m->values, nonzeros, sizeof *m->damping);
-    m->h = 0;
-    return drape_arena_status(&m->values);
+    return m->linear->more[0];
+}
+
+/* NULL if nothing dissipates. */
+static double *damping_of(const drape_radau_matrix *m)
+{
+    return m->linear->more[1];
 }
 
 drape_status drape_radau_matrix_create(drape_arena *arena, drape_system *system, const drape_linear_ops *ops,
@@ -42,8 +41,7 @@ drape_status drape_radau_matrix_create(drape_arena *arena, drape_system *system,
 {
     const drape_model *model = drape_system_model(system);
     const size_t n = 3 * (size_t)model->free_count;
-    *m = (drape_radau_matrix){
-        .system = system, .values = drape_arena_within(arena), .n = 3 * (int64_t)model->free_count};
+    *m = (drape_radau_matrix){.system = system, .n = 3 * (int64_t)model->free_count};
     m->mass = drape_arena_take(arena, n, sizeof *m->mass);
     m->basis = drape_arena_take(arena, 2 * n, (VECTORS + 1) * sizeof *m->basis);
     m->image = drape_arena_take(arena, 2 * n, sizeof *m->image);
@@ -51,85 +49,67 @@ drape_status drape_radau_matrix_create(drape_arena *arena, drape_system *system,
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < n; i++)
         m->mass[i] = model->mass[model->node_of_free[i / 3]];
-    drape_status status = drape_sundials_context(arena->ctx, &m->sun);
-    if (!status)
-        status =
-            drape_sun_linear_create(arena, m->sun, ops, drape_system_pattern(system),
-                                    drape_system_pool(system), drape_system_cancel_flag(system), &m->linear);
-    return status ? status : take_values(m);
+    return drape_system_matrix_create(arena, system, ops, model->has_dissipation ? 2 : 1, 0, &m->linear);
 }
 
 void drape_radau_matrix_destroy(drape_radau_matrix *m)
 {
-    drape_sun_linear_destroy(&m->linear);
-    if (m->sun)
-        SUNContext_Free(&m->sun);
-    drape_arena_free(&m->values);
-}
-
-static drape_status renew(drape_radau_matrix *m)
-{
-    drape_status status = drape_sun_linear_extend_pattern(m->linear, drape_system_pattern(m->system));
-    return status ? status : take_values(m);
+    drape_system_matrix_destroy(&m->linear);
 }
 
 /* ---- Matrices ---- */
 
 drape_status drape_radau_matrix_evaluate(drape_radau_matrix *m, const drape_point *point)
 {
-    bool changed;
     drape_point at = *point;
-    drape_status status = drape_system_extend_pattern(m->system, point, &changed);
+    drape_status status = drape_system_matrix_follow(m->linear, point);
     m->h = 0;
-    m->linear->stale |= changed;
-    if (!status && m->linear->stale)
-        status = renew(m);
     if (status)
         return status;
+    double *stiffness = stiffness_of(m), *damping = damping_of(m);
     at.weight = 0;
-    drape_sun_linear_set_positions(m->linear, at.x, drape_system_model(m->system)->node_of_free);
-    drape_system_jacobian(m->system, &at, 0, 0, m->stiffness);
-    if (m->damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON) {
+    drape_system_jacobian(m->system, &at, 0, 0, stiffness);
+    if (damping && point->contact == DRAPE_CONTACT_GAUSS_NEWTON) {
         /* D with the upper bounds of restitution and friction, which drape_system_damping has not: what K
          * + D has more than K. */
         at.weight = 1;
-        drape_system_jacobian(m->system, &at, 0, 0, m->damping);
+        drape_system_jacobian(m->system, &at, 0, 0, damping);
         for (int64_t k = 0; k < m->linear->pattern->nonzeros; k++)
-            m->damping[k] -= m->stiffness[k];
-    } else if (m->damping)
-        drape_system_damping(m->system, &at, m->damping);
+            damping[k] -= stiffness[k];
+    } else if (damping)
+        drape_system_damping(m->system, &at, damping);
     /* Friction and dashpots of strains that rotate are not symmetric. As in ida.c, Newton's iteration does
      * not need those parts: with Cholesky factors a run takes three quarters of the time, for as many
      * iterations. */
-    drape_pattern_symmetrize(m->linear->pattern, m->stiffness);
-    if (m->damping)
-        drape_pattern_symmetrize(m->linear->pattern, m->damping);
+    drape_pattern_symmetrize(m->linear->pattern, stiffness);
+    if (damping)
+        drape_pattern_symmetrize(m->linear->pattern, damping);
     return DRAPE_OK;
 }
 
 drape_status drape_radau_matrix_factor(drape_radau_matrix *m, double h)
 {
     const drape_pattern *p = m->linear->pattern;
-    const double w = DRAPE_RADAU_GAMMA / h;
+    const double w = DRAPE_RADAU_GAMMA / h, *stiffness = stiffness_of(m), *damping = damping_of(m);
     double *values = m->linear->values;
     if (m->h == h)
         return DRAPE_OK;
     for (int64_t k = 0; k < p->nonzeros; k++)
-        values[k] = m->damping ? m->stiffness[k] + w * m->damping[k] : m->stiffness[k];
+        values[k] = damping ? stiffness[k] + w * damping[k] : stiffness[k];
     for (int32_t j = 0; j < p->block_count; j++) {
         int64_t stride;
         double *to = drape_pattern_at(p, values, j, p->diagonal[j], &stride);
         for (int c = 0; c < 3; c++)
             to[c * stride + c] += w * w * m->mass[3 * j + c];
     }
-    drape_status status = drape_sun_linear_factor(m->linear, false);
+    drape_status status = drape_system_matrix_factor(m->linear, false);
     m->h = status ? 0 : h;
     return status;
 }
 
 drape_status drape_radau_matrix_solve(drape_radau_matrix *m, const double *b, double *x)
 {
-    return drape_sun_linear_solve(m->linear, b, x);
+    return drape_system_matrix_solve(m->linear, b, x);
 }
 
 /* Adds the products of D with `count` vectors x (n each) to as many y. */
@@ -140,7 +120,7 @@ static void multiply_damping(const drape_radau_matrix *m, int count, const doubl
     for (int32_t j = 0; j < p->block_count; j++)
         for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
             int64_t stride;
-            const double *d = drape_pattern_at(p, m->damping, j, k, &stride);
+            const double *d = drape_pattern_at(p, damping_of(m), j, k, &stride);
             for (int i = 0; i < count; i++) {
                 const double *from = x + i * n + 3 * j;
                 double *to = y + i * n + 3 * (int64_t)p->block_row[k];
@@ -152,7 +132,7 @@ static void multiply_damping(const drape_radau_matrix *m, int count, const doubl
 
 void drape_radau_matrix_add_damping(const drape_radau_matrix *m, const double *x, double *y)
 {
-    if (m->damping)
+    if (damping_of(m))
         multiply_damping(m, 1, x, y);
 }
 
@@ -196,8 +176,8 @@ static double normalise(const drape_radau_matrix *m, double *x)
 /* The solution with P of both parts of b. */
 static drape_status precondition(drape_radau_matrix *m, const double *b, double *x)
 {
-    drape_status status = drape_sun_linear_solve(m->linear, b, x);
-    return status ? status : drape_sun_linear_solve(m->linear, b + m->n, x + m->n);
+    drape_status status = drape_system_matrix_solve(m->linear, b, x);
+    return status ? status : drape_system_matrix_solve(m->linear, b + m->n, x + m->n);
 }
 
 /* y = P^-1 C x, from (C - P) x. */
@@ -209,7 +189,7 @@ static drape_status apply(drape_radau_matrix *m, const double *x, double *y)
     const complex_number of_d = {mu.re - w, mu.im}, of_m = {square.re - w * w, square.im};
     double *image = m->image;
     memset(image, 0, 2 * (size_t)n * sizeof *image);
-    if (m->damping)
+    if (damping_of(m))
         multiply_damping(m, 2, x, image);
     for (int64_t i = 0; i < n; i++) {
         const complex_number d = product(of_d, (complex_number){image[i], image[n + i]}),
@@ -290,18 +270,17 @@ drape_status drape_radau_matrix_solve_complex(drape_radau_matrix *m, const doubl
 
 void drape_radau_matrix_archive(drape_radau_matrix *m, drape_archive *a)
 {
-    if (drape_archive_has_read(a) && drape_system_pattern(m->system) != m->linear->pattern)
-        drape_archive_note(a, renew(m));
+    if (drape_archive_has_read(a))
+        drape_archive_note(a, drape_system_matrix_renew(m->linear));
     drape_archive_double(a, &m->h);
     if (!drape_archive_good(a))
         return;
-    drape_archive_doubles(a, m->stiffness, (size_t)m->linear->pattern->nonzeros);
-    if (m->damping)
-        drape_archive_doubles(a, m->damping, (size_t)m->linear->pattern->nonzeros);
-    drape_sun_linear_archive(m->linear, a, m->h > 0);
+    for (int k = 0; k < m->linear->more_count; k++)
+        drape_archive_doubles(a, m->linear->more[k], (size_t)m->linear->pattern->nonzeros);
+    drape_system_matrix_archive(m->linear, a, m->h > 0);
 }
 
 size_t drape_radau_matrix_bytes(const drape_radau_matrix *m)
 {
-    return drape_sun_linear_bytes(m->linear);
+    return drape_system_matrix_bytes(m->linear);
 }

@@ -20,8 +20,7 @@
 #ifndef DRAPE_INTEGRATORS_RADAU_MATRIX_H
 #define DRAPE_INTEGRATORS_RADAU_MATRIX_H
 
-#include "assemble/system.h"
-#include "solvers/sun_linear.h"
+#include "nonlinear/system_matrix.h"
 
 #define DRAPE_RADAU_GAMMA 3.637834252744495732
 #define DRAPE_RADAU_ALPHA 2.681082873627752134
@@ -29,16 +28,12 @@
 
 typedef struct drape_radau_matrix {
     drape_system *system;
-    SUNContext sun;
-    drape_sun_linear *linear; /* P */
-    drape_arena values;       /* holds K and D, which have the pattern of `linear` */
-    double *stiffness;        /* K (nonzeros) */
-    double *damping;          /* D (nonzeros); NULL if nothing dissipates */
-    int64_t n;                /* free DOFs */
-    double *mass;             /* (n) [kg] */
-    double h;                 /* [s] of the factors; 0: there are none of the present K and D */
-    double *basis;            /* of GMRES (vectors + 1, n real parts and n imaginary parts) */
-    double *image;            /* (2 n) */
+    drape_system_matrix *linear; /* P, K and, if something dissipates, D */
+    int64_t n;                   /* free DOFs */
+    double *mass;                /* (n) [kg] */
+    double h;                    /* [s] of the factors; 0: there are none of the present K and D */
+    double *basis;               /* of GMRES (vectors + 1, n real parts and n imaginary parts) */
+    double *image;               /* (2 n) */
 } drape_radau_matrix;
 
 /* Errors: DRAPE_E_MEMORY, those of the linear solver; after one it must still be destroyed. */

@@ -22,7 +22,6 @@
 #include "integrators/implicit.h"
 #include "integrators/instant.h"
 #include "integrators/local_error.h"
-#include "solvers/sun_linear.h"
 
 #include <math.h>
 #include <string.h>
@@ -72,17 +71,14 @@ static const drape_param params[PARAM_COUNT] = {
 typedef struct rosenbrock_state {
     drape_implicit common; /* its equation is not solved; its arrays, and the account of work, are used */
     drape_local_error control;
-    drape_arena *arena;
-    SUNContext sun;
-    drape_sun_linear *linear;                                          /* NULL without free nodes */
+    drape_system_matrix *linear;                                       /* and D; NULL without free nodes */
     double *ux[DRAPE_ROSENBROCK_STAGES], *uv[DRAPE_ROSENBROCK_STAGES]; /* free DOFs */
     double *g0;                                                        /* nodes: at the start of the step */
     double *change;                                                    /* free DOFs: g_t [N/s] */
     double *rx, *right;                                                /* free DOFs: of the present stage */
-    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
-    bool moved;         /* g depends on t */
-    double start_power; /* [W] P at the start of the step */
-    double power;       /* [W] sum b_i P_i of the stages so far */
+    bool moved;                                                        /* g depends on t */
+    double start_power;                                                /* [W] P at the start of the step */
+    double power; /* [W] sum b_i P_i of the stages so far */
 } rosenbrock_state;
 
 /* ---- Work ----
@@ -174,45 +170,24 @@ static drape_status evaluate_change(rosenbrock_state *s, double t, double h, dra
 
 /* ---- The matrix ---- */
 
-static drape_status renew_matrices(rosenbrock_state *s)
-{
-    const drape_pattern *pattern = drape_system_pattern(s->common.equation.system);
-    if (s->common.dissipated) {
-        drape_arena_release(s->arena, s->damping);
-        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
-        if (!s->damping)
-            return DRAPE_E_MEMORY;
-    }
-    return drape_sun_linear_extend_pattern(s->linear, pattern);
-}
-
-static double jacobian_clock(const rosenbrock_state *s)
-{
-    return drape_system_clock(s->common.equation.system) - s->linear->factor_seconds;
-}
-
-/* Assembles and factors w^2 M + w D + K at the start of the step. Contact may couple new nodes. */
+/* Assembles and factors w^2 M + w D + K at the start of the step. */
 static drape_status factor(rosenbrock_state *s, double w, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
-    const double start = jacobian_clock(s);
-    bool changed;
+    drape_system_matrix *m = s->linear;
+    const double start = drape_system_matrix_clock(m);
     e->point.weight = w;
     e->point.contact = DRAPE_CONTACT_EXACT;
-    drape_status status = drape_system_extend_pattern(e->system, &e->point, &changed);
-    s->linear->stale |= changed;
-    if (!status && s->linear->stale)
-        status = renew_matrices(s);
+    drape_status status = drape_system_matrix_follow(m, &e->point);
     if (status)
         return status;
-    drape_sun_linear_set_positions(s->linear, e->point.x, e->model->node_of_free);
-    drape_system_jacobian(e->system, &e->point, w * w, 0, s->linear->values);
-    if (s->damping)
-        drape_system_damping(e->system, &e->point, s->damping);
+    drape_system_jacobian(e->system, &e->point, w * w, 0, m->values);
+    if (m->more[0])
+        drape_system_damping(e->system, &e->point, m->more[0]);
     e->work.jacobians++;
-    e->work.jacobian_seconds += jacobian_clock(s) - start;
+    e->work.jacobian_seconds += drape_system_matrix_clock(m) - start;
     info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
-    return drape_sun_linear_factor(s->linear, false);
+    return drape_system_matrix_factor(m, false);
 }
 
 /* ---- Stages ---- */
@@ -278,11 +253,12 @@ static drape_status solve_stage(rosenbrock_state *s, const drape_state *in, doub
             s->right[k] -= scheme->gammas[i] * h * s->change[k];
     }
     const drape_pattern *p = drape_system_pattern(e->system);
-    for (int64_t j = 0; s->damping && j < p->n; j++)
+    const double *damping = s->linear->more[0];
+    for (int64_t j = 0; damping && j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
-            s->right[drape_pattern_row(p, j, k)] += s->damping[k] * s->rx[j];
+            s->right[drape_pattern_row(p, j, k)] += damping[k] * s->rx[j];
     info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
-    status = drape_sun_linear_solve(s->linear, s->right, s->ux[i]);
+    status = drape_system_matrix_solve(s->linear, s->right, s->ux[i]);
     for (size_t k = 0; k < e->dofs; k++)
         s->uv[i][k] = w * s->ux[i][k] - s->rx[k];
     return status;
@@ -402,40 +378,30 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     rosenbrock_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    s->arena = arena;
     drape_status status = drape_implicit_init(arena, system, &s->common);
     drape_local_error_init(system, values, drape_rosenbrock_rodas.order, &s->control);
     const drape_step_equation *e = &s->common.equation;
     for (int i = 0; i < drape_rosenbrock_rodas.stages; i++) {
-        s->ux[i] = drape_arena_take(s->arena, e->dofs, sizeof *s->ux[i]);
-        s->uv[i] = drape_arena_take(s->arena, e->dofs, sizeof *s->uv[i]);
+        s->ux[i] = drape_arena_take(arena, e->dofs, sizeof *s->ux[i]);
+        s->uv[i] = drape_arena_take(arena, e->dofs, sizeof *s->uv[i]);
     }
-    s->g0 = drape_arena_take(s->arena, e->nodes, sizeof *s->g0);
-    s->change = drape_arena_take(s->arena, e->dofs, sizeof *s->change);
-    s->rx = drape_arena_take(s->arena, e->dofs, sizeof *s->rx);
-    s->right = drape_arena_take(s->arena, e->dofs, sizeof *s->right);
-    if (s->common.dissipated)
-        s->damping =
-            drape_arena_take(s->arena, (size_t)drape_system_pattern(e->system)->nonzeros, sizeof *s->damping);
+    s->g0 = drape_arena_take(arena, e->nodes, sizeof *s->g0);
+    s->change = drape_arena_take(arena, e->dofs, sizeof *s->change);
+    s->rx = drape_arena_take(arena, e->dofs, sizeof *s->rx);
+    s->right = drape_arena_take(arena, e->dofs, sizeof *s->right);
     if (!status)
         status = drape_arena_status(arena);
     if (status || s->common.equation.dofs == 0)
         return status;
-    status = drape_sundials_context(arena->ctx, &s->sun);
-    if (status)
-        return status;
-    return drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                   drape_system_pattern(system), drape_system_pool(system),
-                                   drape_system_cancel_flag(system), &s->linear);
+    return drape_system_matrix_create(arena, system, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+                                      s->common.dissipated != NULL, 0, &s->linear);
 }
 
 static void destroy(void **state)
 {
     rosenbrock_state *s = *state;
-    if (!s)
-        return;
-    drape_sun_linear_destroy(&s->linear);
-    SUNContext_Free(&s->sun);
+    if (s)
+        drape_system_matrix_destroy(&s->linear);
     *state = NULL;
 }
 
@@ -455,15 +421,15 @@ static void archive(void *state, drape_archive *a)
     drape_work_archive(&s->common.equation.work, a);
     if (!s->linear)
         return;
-    if (drape_archive_has_read(a) && drape_system_pattern(s->common.equation.system) != s->linear->pattern)
-        drape_archive_note(a, renew_matrices(s));
-    drape_sun_linear_archive(s->linear, a, false);
+    if (drape_archive_has_read(a))
+        drape_archive_note(a, drape_system_matrix_renew(s->linear));
+    drape_system_matrix_archive(s->linear, a, false);
 }
 
 static size_t bytes(const void *state)
 {
     const rosenbrock_state *s = state;
-    return drape_sun_linear_bytes(s->linear);
+    return drape_system_matrix_bytes(s->linear);
 }
 
 const drape_integrator_ops drape_integrator_rosenbrock = {

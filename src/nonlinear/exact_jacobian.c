@@ -1,53 +1,38 @@
 /* exact_jacobian.c: see exact_jacobian.h. */
 #include "nonlinear/exact_jacobian.h"
 
+#include <string.h>
+
 struct drape_exact_jacobian {
     drape_system *system;
-    drape_sun_linear *linear;
-    int64_t version;                             /* of the pattern */
+    drape_system_matrix *linear;
     bool contact_unsymmetric, terms_unsymmetric; /* the Jacobian of contact, of the terms may be */
 };
 
-drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *system, SUNContext sun,
-                                         const drape_linear_ops *linear, bool near,
+drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *system,
+                                         const drape_linear_ops *linear, bool symmetrizes,
                                          drape_exact_jacobian **out)
 {
     drape_exact_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (drape_ranks_agree_memory(drape_model_ranks(drape_system_model(system)), arena->ctx, s))
         return DRAPE_E_MEMORY;
     s->system = system;
-    s->version = drape_system_pattern_version(system);
     s->contact_unsymmetric = !drape_system_is_symmetric(system);
     s->terms_unsymmetric = !drape_system_has_symmetric_terms(system);
-    drape_status status =
-        drape_sun_linear_create(arena, sun, linear, drape_system_pattern(system), drape_system_pool(system),
-                                drape_system_cancel_flag(system), &s->linear);
-    /* By the symmetric matrix. Without friction, a flag of 13 x 13 nodes takes a quarter and three quarters
-     * more iterations with 1e-4 and 1e-3 than with 1e-5, others as many, and the least CPU with 1e-4. */
-    if (!status && near && (s->contact_unsymmetric || s->terms_unsymmetric))
-        status = drape_sun_linear_use_near(s->linear, s->contact_unsymmetric ? DRAPE_LINEAR_TOLERANCE
-                                                                             : DRAPE_LINEAR_TIGHT);
-    return status;
+    /* Without friction, a flag of 13 x 13 nodes takes a quarter and three quarters more iterations with 1e-4
+     * and 1e-3 than with 1e-5, others as many, and the least CPU with 1e-4. */
+    const double tolerance = !symmetrizes             ? 0
+                             : s->contact_unsymmetric ? DRAPE_LINEAR_TOLERANCE
+                             : s->terms_unsymmetric   ? DRAPE_LINEAR_TIGHT
+                                                      : 0;
+    return drape_system_matrix_create(arena, system, linear, 0, tolerance, &s->linear);
 }
 
 static void destroy(void *matrix)
 {
     drape_exact_jacobian *s = matrix;
     if (s)
-        drape_sun_linear_destroy(&s->linear);
-}
-
-/* Contact may couple new nodes: then the linear solver is created again. */
-static drape_status extend_pattern(drape_exact_jacobian *s, const drape_point *point)
-{
-    bool changed;
-    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
-    s->linear->stale |= s->version != drape_system_pattern_version(s->system);
-    if (!status && s->linear->stale)
-        status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
-    if (!status)
-        s->version = drape_system_pattern_version(s->system);
-    return status;
+        drape_system_matrix_destroy(&s->linear);
 }
 
 static drape_status assemble(void *matrix, const drape_point *at, double mass_weight, bool positive,
@@ -55,29 +40,29 @@ static drape_status assemble(void *matrix, const drape_point *at, double mass_we
 {
     drape_exact_jacobian *s = matrix;
     const double share = positive ? 1 : 0;
-    const double before = drape_system_clock(s->system) - s->linear->factor_seconds; /* without an analysis */
+    drape_system_matrix *m = s->linear;
+    const double before = drape_system_matrix_clock(m);
     drape_point point = *at;
-    drape_status status = extend_pattern(s, at);
+    drape_status status = drape_system_matrix_follow(m, at);
     if (status)
         return status;
     point.contact = DRAPE_CONTACT_SYMMETRIC;
-    drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
-    drape_system_jacobian(s->system, &point, mass_weight, share, s->linear->values);
-    drape_sun_linear_forget_exact(s->linear);
-    if (s->linear->near && (s->terms_unsymmetric || (s->contact_unsymmetric && share < 1))) {
-        drape_sun_linear_keep_exact(s->linear);
+    drape_system_jacobian(s->system, &point, mass_weight, share, m->values);
+    m->corrects = m->exact && (s->terms_unsymmetric || (s->contact_unsymmetric && share < 1));
+    if (m->corrects) {
+        memcpy(m->exact, m->values, (size_t)m->pattern->nonzeros * sizeof *m->exact);
         point.stress = NULL;
-        drape_system_symmetrize(s->system, &point, share, s->linear->values);
+        drape_system_symmetrize(s->system, &point, share, m->values);
     }
     work->jacobians++;
-    work->jacobian_seconds += drape_system_clock(s->system) - s->linear->factor_seconds - before;
+    work->jacobian_seconds += drape_system_matrix_clock(m) - before;
     return DRAPE_OK;
 }
 
 static drape_status factor(void *matrix, bool definite, drape_work *work)
 {
     drape_exact_jacobian *s = matrix;
-    const drape_status status = drape_sun_linear_factor(s->linear, definite);
+    const drape_status status = drape_system_matrix_factor(s->linear, definite);
     *work = drape_work_with_linear(*work, s->linear);
     return status;
 }
@@ -88,7 +73,7 @@ static drape_status solve(void *matrix, const double *b, double tolerance, doubl
     drape_exact_jacobian *s = matrix;
     s->linear->tolerance = tolerance;
     *definite = true;
-    const drape_status status = drape_sun_linear_solve(s->linear, b, x);
+    const drape_status status = drape_system_matrix_solve(s->linear, b, x);
     *work = drape_work_with_linear(*work, s->linear);
     return status;
 }
@@ -96,7 +81,7 @@ static drape_status solve(void *matrix, const double *b, double tolerance, doubl
 drape_status drape_exact_jacobian_at(drape_exact_jacobian *s, const drape_point *point, double mass_weight,
                                      const drape_pattern **pattern, const double **values)
 {
-    drape_status status = extend_pattern(s, point);
+    drape_status status = drape_system_matrix_follow(s->linear, point);
     if (status)
         return status;
     drape_system_jacobian(s->system, point, mass_weight, 0, s->linear->values);
@@ -109,16 +94,13 @@ static void archive(void *matrix, drape_archive *a)
 {
     drape_exact_jacobian *s = matrix;
     if (drape_archive_has_read(a))
-        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(s->system)));
-    if (drape_archive_has_read(a))
-        s->version = drape_system_pattern_version(s->system);
-    s->linear->stale |= s->version != drape_system_pattern_version(s->system);
-    drape_sun_linear_archive(s->linear, a, false);
+        drape_archive_note(a, drape_system_matrix_renew(s->linear));
+    drape_system_matrix_archive(s->linear, a, false);
 }
 
 static size_t bytes(const void *matrix)
 {
-    return drape_sun_linear_bytes(((const drape_exact_jacobian *)matrix)->linear);
+    return drape_system_matrix_bytes(((const drape_exact_jacobian *)matrix)->linear);
 }
 
 const drape_matrix_ops drape_exact_jacobian_ops = {.exact = true,

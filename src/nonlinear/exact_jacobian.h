@@ -17,10 +17,11 @@ typedef struct drape_exact_jacobian drape_exact_jacobian;
 
 extern const drape_matrix_ops drape_exact_jacobian_ops;
 
-/* linear: a linear solver; near: an unsymmetric J is solved with as said above, else by its own factors. The
- * arena and sun must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then it must be destroyed. */
-drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *system, SUNContext sun,
-                                         const drape_linear_ops *linear, bool near,
+/* linear: a linear solver; symmetrizes: an unsymmetric J is solved with as said above, else by its own
+ * factors. The arena must outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then it must be
+ * destroyed. */
+drape_status drape_exact_jacobian_create(drape_arena *arena, drape_system *system,
+                                         const drape_linear_ops *linear, bool symmetrizes,
                                          drape_exact_jacobian **out);
 
 /* J itself at a point, valid until the next use; the factors are lost. Errors: DRAPE_E_MEMORY. */

@@ -7,7 +7,6 @@
 #include "nonlinear/nonsymmetric.h"
 #include "nonlinear/scalar_stiffness.h"
 #include "solvers/pcg.h"
-#include "solvers/sun_linear.h"
 
 #include <math.h>
 #include <string.h>
@@ -32,12 +31,10 @@ struct drape_factored_jacobian {
     bool nonsymmetric; /* the Jacobian of the terms may be */
     bool lumps;        /* N is factored, in a pattern without what only C couples; else A */
     drape_scalar_stiffness scalar;
-    int32_t *block;  /* (entries of C) in the pattern; -1: lumped */
-    int64_t version; /* of the pattern */
+    int32_t *block; /* (entries of C) in the pattern; -1: lumped */
     drape_pcg pcg;
     drape_nonsymmetric rest;
-    SUNContext sun;
-    drape_sun_linear *linear;
+    drape_system_matrix *linear;
 };
 
 /* ---- Where it is better ---- */
@@ -117,29 +114,18 @@ static void place_scalars(drape_factored_jacobian *s)
     }
 }
 
-/* The pattern may have changed, or be that of a checkpoint. */
-static drape_status take_pattern(drape_factored_jacobian *s)
-{
-    drape_status status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
-    s->version = drape_system_pattern_version(s->system);
-    place_scalars(s);
-    return status;
-}
-
 static drape_status compute(drape_factored_jacobian *s, const drape_point *at, double mass_weight,
                             bool positive)
 {
-    bool changed;
+    const int64_t version = s->linear->version;
     drape_point point = *at;
     point.contact = DRAPE_CONTACT_GAUSS_NEWTON;
-    drape_status status = drape_system_extend_pattern(s->system, at, &changed);
-    s->linear->stale |= s->version != drape_system_pattern_version(s->system);
-    if (!status && s->linear->stale)
-        status = take_pattern(s);
+    drape_status status = drape_system_matrix_follow(s->linear, at);
     if (status)
         return status;
+    if (s->linear->version != version)
+        place_scalars(s);
     drape_scalar_stiffness_weigh(&s->scalar, at->weight, mass_weight);
-    drape_sun_linear_set_positions(s->linear, point.x, drape_system_model(s->system)->node_of_free);
     drape_system_jacobian_without(s->system, &point, 0, positive ? 1 : 0, s->flat, s->linear->values);
     /* C and the masses; what is not in the pattern is lumped. */
     const drape_pattern *p = drape_system_pattern(s->system);
@@ -162,12 +148,11 @@ static drape_status assemble(void *matrix, const drape_point *point, double mass
                              drape_work *work)
 {
     drape_factored_jacobian *s = matrix;
-    double start = drape_system_clock(s->system), factoring = s->linear->factor_seconds;
+    const double start = drape_system_matrix_clock(s->linear), factoring = s->linear->factor_seconds;
     drape_status status = compute(s, point, mass_weight, positive);
-    factoring = s->linear->factor_seconds - factoring; /* the analysis of a new pattern */
     work->jacobians++;
-    work->jacobian_seconds += drape_system_clock(s->system) - start - factoring;
-    work->factor_seconds += factoring;
+    work->jacobian_seconds += drape_system_matrix_clock(s->linear) - start;
+    work->factor_seconds += s->linear->factor_seconds - factoring; /* of the analysis of a new pattern */
     return status;
 }
 
@@ -175,7 +160,7 @@ static drape_status factor(void *matrix, bool definite, drape_work *work)
 {
     drape_factored_jacobian *s = matrix;
     const double before = s->linear->factor_seconds;
-    const drape_status status = drape_sun_linear_factor(s->linear, definite);
+    const drape_status status = drape_system_matrix_factor(s->linear, definite);
     work->factorizations++;
     work->factor_seconds += s->linear->factor_seconds - before;
     return status;
@@ -212,7 +197,7 @@ static void multiply(const void *owner, const double *x, double *y)
 static void precondition(const void *owner, const double *r, double *z)
 {
     const drape_factored_jacobian *s = owner;
-    if (drape_sun_linear_solve(s->linear, r, z))
+    if (drape_system_matrix_solve(s->linear, r, z))
         memset(z, 0, (size_t)s->pcg.n * sizeof *z);
 }
 
@@ -238,7 +223,7 @@ static drape_status solve(void *matrix, const double *b, double tolerance, doubl
                      : drape_all_finite(x, (size_t)s->pcg.n) ? DRAPE_OK
                                                              : DRAPE_RETRY_LINEAR;
         } else {
-            status = drape_sun_linear_solve(s->linear, b, x);
+            status = drape_system_matrix_solve(s->linear, b, x);
         }
     }
     work->linear_iterations += iterations;
@@ -314,13 +299,8 @@ drape_status drape_factored_jacobian_create(drape_arena *arena, drape_system *sy
         status = choose_pattern(s, dt);
     if (status)
         return status;
-    status = drape_sundials_context(arena->ctx, &s->sun);
-    if (status)
-        return status;
-    s->version = drape_system_pattern_version(system);
-    return drape_sun_linear_create(arena, s->sun, drape_linear_best(3 * (int64_t)m->free_count),
-                                   drape_system_pattern(system), drape_system_pool(system),
-                                   drape_system_cancel_flag(system), &s->linear);
+    return drape_system_matrix_create(arena, system, drape_linear_best(3 * (int64_t)m->free_count), 0, 0,
+                                      &s->linear);
 }
 
 static void destroy(void *matrix)
@@ -328,10 +308,8 @@ static void destroy(void *matrix)
     drape_factored_jacobian *s = matrix;
     if (!s)
         return;
-    drape_sun_linear_destroy(&s->linear);
+    drape_system_matrix_destroy(&s->linear);
     drape_nonsymmetric_free(&s->rest);
-    if (s->sun)
-        SUNContext_Free(&s->sun);
 }
 
 /* Each solve begins with a new matrix, so the factors themselves are not archived. */
@@ -339,14 +317,16 @@ static void archive(void *matrix, drape_archive *a)
 {
     drape_factored_jacobian *s = matrix;
     drape_archive_mark(a, "factored jacobian");
-    if (drape_archive_has_read(a))
-        drape_archive_note(a, take_pattern(s));
-    drape_sun_linear_archive(s->linear, a, false);
+    if (drape_archive_has_read(a)) {
+        drape_archive_note(a, drape_system_matrix_renew(s->linear));
+        place_scalars(s);
+    }
+    drape_system_matrix_archive(s->linear, a, false);
 }
 
 static size_t bytes(const void *matrix)
 {
-    return drape_sun_linear_bytes(((const drape_factored_jacobian *)matrix)->linear);
+    return drape_system_matrix_bytes(((const drape_factored_jacobian *)matrix)->linear);
 }
 
 const drape_matrix_ops drape_factored_jacobian_ops = {.direct = true,

@@ -42,7 +42,7 @@
 #include "nonlinear/residual_bound.h"
 #include "nonlinear/stopping.h"
 #include "nonlinear/stress_predictor.h"
-#include "solvers/sun_linear.h"
+#include "solvers/sun_shell.h"
 #include "solvers/vector.h"
 
 #include <float.h>
@@ -692,9 +692,8 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
     } else {
         s->usual.ops = &drape_exact_jacobian_ops;
         status = drape_exact_jacobian_create(
-            arena, system, s->sun,
-            drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]), s->searches,
-            (drape_exact_jacobian **)&s->usual.self);
+            arena, system, drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]),
+            s->searches, (drape_exact_jacobian **)&s->usual.self);
     }
     if (!status)
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);

@@ -14,14 +14,14 @@ void drape_work_archive(drape_work *work, drape_archive *a)
         drape_archive_double(a, seconds[i]);
 }
 
-drape_work drape_work_with_linear(drape_work work, const drape_sun_linear *linear)
+drape_work drape_work_with_linear(drape_work work, const drape_system_matrix *matrix)
 {
-    if (!linear)
+    if (!matrix)
         return work;
-    work.factorizations = linear->factorizations;
-    work.linear_iterations = linear->iterations;
-    work.factor_seconds = linear->factor_seconds;
-    work.solve_seconds = linear->solve_seconds;
+    work.factorizations = matrix->factorizations;
+    work.linear_iterations = matrix->iterations;
+    work.factor_seconds = matrix->factor_seconds;
+    work.solve_seconds = matrix->solve_seconds;
     return work;
 }
 

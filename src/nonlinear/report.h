@@ -2,9 +2,8 @@
 #ifndef DRAPE_NONLINEAR_REPORT_H
 #define DRAPE_NONLINEAR_REPORT_H
 
-#include "assemble/system.h"
 #include "base/archive.h"
-#include "solvers/sun_linear.h"
+#include "nonlinear/system_matrix.h"
 
 /* How one solve ended. */
 typedef struct drape_solve_report {
@@ -36,8 +35,8 @@ typedef struct drape_work {
 /* The counts and times of both, and the equilibrium of `work`. */
 drape_work drape_work_sum(drape_work work, const drape_work *other);
 
-/* The same work with what a linear solver counts, unless that is NULL. */
-drape_work drape_work_with_linear(drape_work work, const drape_sun_linear *linear);
+/* The same work with what a matrix counts, unless that is NULL. */
+drape_work drape_work_with_linear(drape_work work, const drape_system_matrix *matrix);
 
 void drape_work_archive(drape_work *work, drape_archive *a);
 

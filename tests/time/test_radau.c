@@ -252,7 +252,7 @@ static void residual_of(drape_radau_matrix *m, double h, const double *b, const 
     for (int64_t j = 0; j < n; j++) {
         const double re = x[j], im = x[n + j];
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
-            const double stiff = m->stiffness[k], damp = m->damping ? m->damping[k] : 0;
+            const double stiff = m->linear->more[0][k], damp = m->linear->more[1] ? m->linear->more[1][k] : 0;
             r[drape_pattern_row(p, j, k)] -= stiff * re + damp * (mu[0] * re - mu[1] * im);
             r[n + drape_pattern_row(p, j, k)] -= stiff * im + damp * (mu[0] * im + mu[1] * re);
         }
