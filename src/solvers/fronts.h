@@ -110,27 +110,6 @@ static inline int64_t drape_front_tile_at(const drape_front *f, int32_t row_stri
     return (c * f->row_strips - c * (c - 1) / 2 + row_strip - c) * DRAPE_TILE;
 }
 
-/* ---- Solution: fronts_solve.c ---- */
-
-/* The columns of a front that share a diagonal tile, in a solve. */
-typedef struct drape_front_tile_solve {
-    int32_t at, width;  /* the first column, counted over all fronts; their number */
-    const double *tile; /* the diagonal tile of the lower half */
-    double *x;          /* (width) */
-} drape_front_tile_solve;
-
-/* Factors of a front in its panels: below the diagonal tile the product of `forward` is in the lower half,
- * that of `backward` in half `back`. */
-typedef struct drape_front_solver {
-    drape_half back;
-    void (*forward)(const drape_front_tile_solve *t, void *user);
-    void (*backward)(const drape_front_tile_solve *t, void *user);
-    void *user;
-} drape_front_solver;
-
-/* x = A^-1 b, both in the pattern's order; they may be the same. */
-void drape_fronts_solve(drape_fronts *s, const drape_front_solver *solver, const double *b, double *x);
-
 /* The number of doubles of scratch for one branch, or for the top. */
 int64_t drape_fronts_scratch(const drape_fronts *s);
 

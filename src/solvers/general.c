@@ -90,7 +90,7 @@ static drape_status take(drape_general *g)
     const drape_pattern *p = g->fronts->pattern;
     const size_t n = (size_t)p->n;
     drape_arena *arena = &g->arena;
-    drape_status status = drape_block_lu_create(arena, g->fronts, &g->lu);
+    drape_status status = drape_front_factors_create(arena, g->fronts, false, &g->lu);
     if (!status)
         status = drape_refine_create(arena, p, &g->refine);
     if (!status)
@@ -122,7 +122,7 @@ static bool is_solvable(drape_general *g)
     const int64_t n = g->fronts->pattern->n;
     for (int64_t i = 0; i < n; i++)
         g->b[i] = (double)((uint32_t)i * UINT32_C(2654435769) >> 16) / 32768 - 1;
-    if (drape_refine_solve(&g->refine, drape_block_lu_solve, &g->lu, g->scaled, g->b, g->x))
+    if (drape_refine_solve(&g->refine, drape_front_factors_solve, &g->lu, g->scaled, g->b, g->x))
         return false;
     for (int64_t i = 0; i < n; i++)
         if (!(fabs(g->x[i]) * DRAPE_SINGULAR < 1))
@@ -132,9 +132,11 @@ static bool is_solvable(drape_general *g)
 
 static drape_status factor_scaled(drape_general *g, double shift)
 {
+    double low, high;
     g->lu.shift = shift;
-    drape_status status = drape_block_lu_factor(&g->lu);
-    if (!status && !(drape_block_lu_smallest_pivot(&g->lu) > ROOT) && !is_solvable(g))
+    drape_status status = drape_front_factors_make(&g->lu);
+    drape_front_factors_range(&g->lu, &low, &high);
+    if (!status && !(1 / high > ROOT) && !is_solvable(g))
         status = DRAPE_RETRY_LINEAR;
     return status;
 }
@@ -203,7 +205,7 @@ drape_status drape_general_solve(drape_general *g, const double *b, double *x)
     if (!drape_all_finite(g->b, (size_t)n))
         return status;
     if (g->factored)
-        status = drape_refine_solve(&g->refine, drape_block_lu_solve, &g->lu, g->scaled, g->b, g->x);
+        status = drape_refine_solve(&g->refine, drape_front_factors_solve, &g->lu, g->scaled, g->b, g->x);
     if (status == DRAPE_RETRY_LINEAR) {
         status = factor_by_klu(g);
         if (!status)

@@ -10,13 +10,13 @@
 #ifndef DRAPE_SOLVERS_GENERAL_H
 #define DRAPE_SOLVERS_GENERAL_H
 
-#include "solvers/block_lu.h"
+#include "solvers/front_factors.h"
 #include "solvers/refine.h"
 
 typedef struct drape_general {
     drape_arena arena; /* NULL arrays below: nothing was taken yet */
     drape_fronts *fronts;
-    drape_block_lu lu;
+    drape_front_factors lu;
     drape_refine refine;
     double *scaled, *row, *column; /* (nonzeros), (n), (n): see general.c */
     double *b, *x;                 /* (n) of the scaled matrix */

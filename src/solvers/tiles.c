@@ -71,6 +71,24 @@ LANES_DISPATCH void drape_tile_divide(int n, const double *tile, const double *i
     }
 }
 
+void drape_tile_solve(int n, const double *tile, const double *inverse, double *x)
+{
+    for (int p = 0; p < n; p++) {
+        x[p] *= inverse[p];
+        for (int q = p + 1; q < n; q++)
+            x[q] -= tile[S * p + q] * x[p];
+    }
+}
+
+void drape_tile_solve_transposed(int n, const double *tile, const double *inverse, double *x)
+{
+    for (int p = n - 1; p >= 0; p--) {
+        for (int q = p + 1; q < n; q++)
+            x[p] -= tile[S * p + q] * x[q];
+        x[p] *= inverse[p];
+    }
+}
+
 /* Column by column, from the left: the multipliers above a pivot are zero. */
 LANES_DISPATCH double drape_tile_lu(int n, double *tile, double *inverse, int32_t *pivot)
 {

@@ -27,6 +27,10 @@ bool drape_tile_factor(int n, double *tile, double *inverse);
 /* X = A L^-T in place, for n columns of a strip; L is a factored tile. */
 void drape_tile_divide(int n, const double *tile, const double *inverse, double *strip);
 
+/* x (n) = L^-1 x, and L^-T x. */
+void drape_tile_solve(int n, const double *tile, const double *inverse, double *x);
+void drape_tile_solve_transposed(int n, const double *tile, const double *inverse, double *x);
+
 /* Replaces the first n rows and columns of a tile T by its factors L U = P T, with row interchanges: row j
  * was exchanged with row pivot[j] (n); inverse (n) becomes the inverses of the diagonal of U. Returns the
  * smallest magnitude on it; if that is 0, there are no factors. */
