@@ -217,30 +217,15 @@ static bool begin(drape_first_order *f, double t, double h)
     return true;
 }
 
-static drape_first_order_outcome outcome_of(int code)
-{
-    switch (code) {
-    case ARK_SUCCESS:
-    case ARK_TSTOP_RETURN:
-        return DRAPE_FIRST_ORDER_STEPPED;
-    case ARK_ERR_FAILURE:
-        return DRAPE_FIRST_ORDER_ERROR_TEST;
-    case ARK_TOO_MUCH_ACC:
-        return DRAPE_FIRST_ORDER_ROUND_OFF;
-    case ARK_CONV_FAILURE:
-        return DRAPE_FIRST_ORDER_NEWTON;
-    case ARK_LSETUP_FAIL:
-    case ARK_LSOLVE_FAIL:
-        return DRAPE_FIRST_ORDER_SINGULAR;
-    case ARK_RHSFUNC_FAIL:
-    case ARK_FIRST_RHSFUNC_ERR:
-    case ARK_REPTD_RHSFUNC_ERR:
-    case ARK_UNREC_RHSFUNC_ERR:
-        return DRAPE_FIRST_ORDER_RESIDUAL;
-    default: /* ARK_MEM_NULL, ARK_ILL_INPUT, ARK_LINIT_FAIL, ARK_VECTOROP_ERR ... */
-        return DRAPE_FIRST_ORDER_REFUSED;
-    }
-}
+/* The other codes are ARK_MEM_NULL, ARK_ILL_INPUT, ARK_LINIT_FAIL, ARK_VECTOROP_ERR and the like. */
+static const drape_solver_code codes[] = {
+    {ARK_SUCCESS, DRAPE_REASON_CONVERGED},           {ARK_TSTOP_RETURN, DRAPE_REASON_CONVERGED},
+    {ARK_ERR_FAILURE, DRAPE_REASON_ERROR_TEST},      {ARK_TOO_MUCH_ACC, DRAPE_REASON_ROUND_OFF},
+    {ARK_CONV_FAILURE, DRAPE_REASON_NEWTON},         {ARK_LSETUP_FAIL, DRAPE_REASON_SINGULAR},
+    {ARK_LSOLVE_FAIL, DRAPE_REASON_SINGULAR},        {ARK_RHSFUNC_FAIL, DRAPE_REASON_NONFINITE},
+    {ARK_FIRST_RHSFUNC_ERR, DRAPE_REASON_NONFINITE}, {ARK_REPTD_RHSFUNC_ERR, DRAPE_REASON_NONFINITE},
+    {ARK_UNREC_RHSFUNC_ERR, DRAPE_REASON_NONFINITE},
+};
 
 /* Limits the growth of steps that need many matrices. */
 static double limit_effort(const dirk_state *s, double growth)
@@ -287,7 +272,7 @@ static bool copy_last_derivative(drape_first_order *f)
     return true;
 }
 
-static drape_first_order_outcome step(drape_first_order *f, double end, double *t)
+static drape_reason step(drape_first_order *f, double end, double *t)
 {
     dirk_state *s = (dirk_state *)f;
     void *m = f->memory;
@@ -300,23 +285,23 @@ static drape_first_order_outcome step(drape_first_order *f, double end, double *
         isnan(fixed_step(s)) ? ARKStepSetInitStep : ARKStepSetFixedStep;
     if (ARKStepReInit(m, NULL, rhs, s->t, s->before) || set_size(m, s->next) ||
         ARKStepSetStopTime(m, f->span[1]))
-        return DRAPE_FIRST_ORDER_REFUSED;
+        return DRAPE_REASON_SOLVER;
     drape_reserve reserve = {.used = false}; /* the first call takes memory */
     drape_status memory =
         s->attempted ? DRAPE_OK : drape_reserve_open(&reserve, f->arena->ctx, 2 * (size_t)f->n);
-    const drape_first_order_outcome outcome =
-        memory ? DRAPE_FIRST_ORDER_MEMORY : outcome_of(ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP));
+    const int code = memory ? ARK_MEM_FAIL : ARKStepEvolve(m, end, f->y, t, ARK_ONE_STEP);
     s->attempted |= !memory;
     if (drape_reserve_close(&reserve, f->arena->ctx, memory))
-        return DRAPE_FIRST_ORDER_MEMORY;
-    if (outcome != DRAPE_FIRST_ORDER_STEPPED)
-        return outcome;
+        return DRAPE_REASON_MEMORY;
+    const drape_reason reason = drape_solver_reason(codes, sizeof codes / sizeof *codes, code);
+    if (reason != DRAPE_REASON_CONVERGED)
+        return reason;
     if (!copy_last_derivative(f))
-        return DRAPE_FIRST_ORDER_REFUSED;
+        return DRAPE_REASON_SOLVER;
     s->h = *t - s->t;
     s->t = *t;
     choose_next(s);
-    return outcome;
+    return reason;
 }
 
 /* Hermite's polynomials. */

@@ -306,35 +306,17 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
     return DRAPE_OK;
 }
 
-static drape_status status_of(drape_first_order_outcome outcome, bool nonfinite, const char **reason)
-{
-    static const struct {
-        drape_status status;
-        drape_reason reason;
-    } meanings[] = {
-        [DRAPE_FIRST_ORDER_STEPPED] = {DRAPE_OK, DRAPE_REASON_CONVERGED},
-        [DRAPE_FIRST_ORDER_ERROR_TEST] = {DRAPE_RETRY_REJECTED, DRAPE_REASON_ERROR_TEST},
-        [DRAPE_FIRST_ORDER_ROUND_OFF] = {DRAPE_RETRY_REJECTED, DRAPE_REASON_ROUND_OFF},
-        [DRAPE_FIRST_ORDER_NEWTON] = {DRAPE_RETRY_NONLINEAR, DRAPE_REASON_NEWTON},
-        [DRAPE_FIRST_ORDER_SINGULAR] = {DRAPE_RETRY_LINEAR, DRAPE_REASON_SINGULAR},
-        [DRAPE_FIRST_ORDER_RESIDUAL] = {DRAPE_RETRY_NONFINITE, DRAPE_REASON_NONFINITE},
-        [DRAPE_FIRST_ORDER_REFUSED] = {DRAPE_E_SOLVER, DRAPE_REASON_SOLVER},
-        [DRAPE_FIRST_ORDER_MEMORY] = {DRAPE_E_MEMORY, DRAPE_REASON_MEMORY},
-    };
-    if (outcome == DRAPE_FIRST_ORDER_NEWTON && nonfinite)
-        outcome = DRAPE_FIRST_ORDER_RESIDUAL;
-    *reason = drape_reason_name(meanings[outcome].reason);
-    return meanings[outcome].status;
-}
-
 /* Makes one step of the solver, at most to `end`; *t: the time that it reached. */
 static drape_status solve(drape_first_order *s, double end, double h, double *t, drape_step_info *info)
 {
     long iterations = 0;
     s->crossing = s->crossed = s->nonfinite = false;
     s->failure = DRAPE_OK;
-    const drape_first_order_outcome outcome = s->solver->step(s, end, t);
-    drape_status status = status_of(outcome, s->nonfinite, &info->reason);
+    drape_reason reason = s->solver->step(s, end, t);
+    if (reason == DRAPE_REASON_NEWTON && s->nonfinite)
+        reason = DRAPE_REASON_NONFINITE;
+    drape_status status = drape_solver_status(reason);
+    info->reason = drape_reason_name(reason);
     if (status > 0 && s->crossing)
         info->reason = s->crossing_reason;
     if (drape_system_agree(s->system))

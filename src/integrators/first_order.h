@@ -79,18 +79,6 @@ extern const char *const drape_first_order_matrices[];
 
 typedef struct drape_first_order drape_first_order;
 
-/* How a step of a library ended. */
-typedef enum drape_first_order_outcome {
-    DRAPE_FIRST_ORDER_STEPPED,
-    DRAPE_FIRST_ORDER_ERROR_TEST,
-    DRAPE_FIRST_ORDER_ROUND_OFF,
-    DRAPE_FIRST_ORDER_NEWTON,
-    DRAPE_FIRST_ORDER_SINGULAR,
-    DRAPE_FIRST_ORDER_RESIDUAL, /* it could not be evaluated */
-    DRAPE_FIRST_ORDER_REFUSED,  /* no smaller step helps */
-    DRAPE_FIRST_ORDER_MEMORY    /* ran out */
-} drape_first_order_outcome;
-
 /* A solver of SUNDIALS. Its functions may assume that there are free DOFs, except those that free. */
 typedef struct drape_first_order_solver {
     const char *name;             /* for messages */
@@ -106,8 +94,8 @@ typedef struct drape_first_order_solver {
     void (*destroy_vectors)(drape_first_order *f); /* of the entry; NULL: it has none */
     /* Restarts at t from y, y' in f->y, f->rate with a first step of h at most; 0: it chooses. */
     bool (*begin)(drape_first_order *f, double t, double h);
-    /* One step towards end, at most to f->span[1]. *t: where it ended, y there in f->y. */
-    drape_first_order_outcome (*step)(drape_first_order *f, double end, double *t);
+    /* One step towards end, at most to f->span[1], and how it ended. *t: where, y there in f->y. */
+    drape_reason (*step)(drape_first_order *f, double end, double *t);
     int (*last_step)(void *memory, sunrealtype *h);
     int (*current_step)(void *memory, sunrealtype *h);
     int (*iterations)(void *memory, long *count);      /* of Newton, since `begin` */

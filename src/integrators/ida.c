@@ -72,31 +72,22 @@ static bool begin(drape_first_order *s, double t, double h)
     return !IDAReInit(s->memory, t, s->y, s->rate) && !IDASetInitStep(s->memory, h);
 }
 
-static drape_first_order_outcome step(drape_first_order *s, double end, double *t)
+/* The other codes are IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR and the like. */
+static const drape_solver_code codes[] = {
+    {IDA_SUCCESS, DRAPE_REASON_CONVERGED},        {IDA_TSTOP_RETURN, DRAPE_REASON_CONVERGED},
+    {IDA_ERR_FAIL, DRAPE_REASON_ERROR_TEST},      {IDA_TOO_MUCH_ACC, DRAPE_REASON_ROUND_OFF},
+    {IDA_CONV_FAIL, DRAPE_REASON_NEWTON},         {IDA_NLS_FAIL, DRAPE_REASON_NEWTON},
+    {IDA_LSETUP_FAIL, DRAPE_REASON_SINGULAR},     {IDA_LSOLVE_FAIL, DRAPE_REASON_SINGULAR},
+    {IDA_RES_FAIL, DRAPE_REASON_NONFINITE},       {IDA_REP_RES_ERR, DRAPE_REASON_NONFINITE},
+    {IDA_FIRST_RES_FAIL, DRAPE_REASON_NONFINITE},
+};
+
+static drape_reason step(drape_first_order *s, double end, double *t)
 {
     if (IDASetStopTime(s->memory, s->span[1]))
-        return DRAPE_FIRST_ORDER_REFUSED;
-    switch (IDASolve(s->memory, end, t, s->y, s->rate, IDA_ONE_STEP)) {
-    case IDA_SUCCESS:
-    case IDA_TSTOP_RETURN:
-        return DRAPE_FIRST_ORDER_STEPPED;
-    case IDA_ERR_FAIL:
-        return DRAPE_FIRST_ORDER_ERROR_TEST;
-    case IDA_TOO_MUCH_ACC:
-        return DRAPE_FIRST_ORDER_ROUND_OFF;
-    case IDA_CONV_FAIL:
-    case IDA_NLS_FAIL:
-        return DRAPE_FIRST_ORDER_NEWTON;
-    case IDA_LSETUP_FAIL:
-    case IDA_LSOLVE_FAIL:
-        return DRAPE_FIRST_ORDER_SINGULAR;
-    case IDA_RES_FAIL:
-    case IDA_REP_RES_ERR:
-    case IDA_FIRST_RES_FAIL:
-        return DRAPE_FIRST_ORDER_RESIDUAL;
-    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ... */
-        return DRAPE_FIRST_ORDER_REFUSED;
-    }
+        return DRAPE_REASON_SOLVER;
+    return drape_solver_reason(codes, sizeof codes / sizeof *codes,
+                               IDASolve(s->memory, end, t, s->y, s->rate, IDA_ONE_STEP));
 }
 
 static int dense(drape_first_order *s, double t, N_Vector out)

@@ -504,43 +504,23 @@ static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vecto
 
 /* ---- Conclude ---- */
 
-/* The meaning of every return code of KINSol for the step. */
-static drape_status status_of(int code, const char **reason)
-{
-    switch (code) {
-    case KIN_SUCCESS:
-    case KIN_INITIAL_GUESS_OK:
-        *reason = drape_reason_name(DRAPE_REASON_CONVERGED);
-        return DRAPE_OK;
-    case KIN_STEP_LT_STPTOL: /* positive, but not converged */
-        *reason = drape_reason_name(DRAPE_REASON_STAGNATION);
-        return DRAPE_RETRY_NONLINEAR;
-    case KIN_MAXITER_REACHED:
-        *reason = drape_reason_name(DRAPE_REASON_MAX_ITERATIONS);
-        return DRAPE_RETRY_NONLINEAR;
-    case KIN_LINESEARCH_NONCONV:
-    case KIN_LINESEARCH_BCFAIL:
-        *reason = drape_reason_name(DRAPE_REASON_LINE_SEARCH);
-        return DRAPE_RETRY_NONLINEAR;
-    case KIN_MXNEWT_5X_EXCEEDED:
-        *reason = drape_reason_name(DRAPE_REASON_NEWTON_STEP);
-        return DRAPE_RETRY_NONLINEAR;
-    case KIN_LINSOLV_NO_RECOVERY:
-    case KIN_LSETUP_FAIL:
-    case KIN_LSOLVE_FAIL:
-        *reason = drape_reason_name(DRAPE_REASON_SINGULAR);
-        return DRAPE_RETRY_LINEAR;
-    case KIN_SYSFUNC_FAIL:
-    case KIN_FIRST_SYSFUNC_ERR:
-    case KIN_REPTD_SYSFUNC_ERR:
-        *reason = drape_reason_name(DRAPE_REASON_NONFINITE);
-        return DRAPE_RETRY_NONFINITE;
-    default: /* KIN_MEM_NULL, KIN_ILL_INPUT, KIN_NO_MALLOC, KIN_MEM_FAIL, KIN_LINIT_FAIL, KIN_VECTOROP_ERR
-                ...: no smaller step helps */
-        *reason = drape_reason_name(DRAPE_REASON_SOLVER);
-        return DRAPE_E_SOLVER;
-    }
-}
+/* The other codes are KIN_MEM_NULL, KIN_ILL_INPUT, KIN_NO_MALLOC, KIN_MEM_FAIL, KIN_LINIT_FAIL,
+ * KIN_VECTOROP_ERR and the like. */
+static const drape_solver_code codes[] = {
+    {KIN_SUCCESS, DRAPE_REASON_CONVERGED},
+    {KIN_INITIAL_GUESS_OK, DRAPE_REASON_CONVERGED},
+    {KIN_STEP_LT_STPTOL, DRAPE_REASON_STAGNATION}, /* a positive code, but not converged */
+    {KIN_MAXITER_REACHED, DRAPE_REASON_MAX_ITERATIONS},
+    {KIN_LINESEARCH_NONCONV, DRAPE_REASON_LINE_SEARCH},
+    {KIN_LINESEARCH_BCFAIL, DRAPE_REASON_LINE_SEARCH},
+    {KIN_MXNEWT_5X_EXCEEDED, DRAPE_REASON_NEWTON_STEP},
+    {KIN_LINSOLV_NO_RECOVERY, DRAPE_REASON_SINGULAR},
+    {KIN_LSETUP_FAIL, DRAPE_REASON_SINGULAR},
+    {KIN_LSOLVE_FAIL, DRAPE_REASON_SINGULAR},
+    {KIN_SYSFUNC_FAIL, DRAPE_REASON_NONFINITE},
+    {KIN_FIRST_SYSFUNC_ERR, DRAPE_REASON_NONFINITE},
+    {KIN_REPTD_SYSFUNC_ERR, DRAPE_REASON_NONFINITE},
+};
 
 /* Whether F at d is small enough. If KINSOL converged, its last evaluation was at d; otherwise it may have
  * been at a trial point. */
@@ -606,7 +586,9 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
 {
     drape_step_equation *e = s->equation;
     long iterations = 0;
-    drape_status status = status_of(code, &report->reason);
+    const drape_reason reason = drape_solver_reason(codes, sizeof codes / sizeof *codes, code);
+    drape_status status = drape_solver_status(reason);
+    report->reason = drape_reason_name(reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
     report->laborious = !s->effort.keeps && (double)iterations > fmax(EASY, EASY_SHARE * s->effort.most);
@@ -691,9 +673,8 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
         status = drape_matrix_choose(arena, system, dt, &s->usual, &s->cheap);
     } else {
         s->usual.ops = &drape_exact_jacobian_ops;
-        status = drape_exact_jacobian_create(
-            arena, system, drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]),
-            s->searches, (drape_exact_jacobian **)&s->usual.self);
+        status = drape_exact_jacobian_create(arena, system,
+                                             drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]), s->searches, (drape_exact_jacobian **)&s->usual.self);
     }
     if (!status)
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);

@@ -43,3 +43,32 @@ drape_work drape_work_sum(drape_work work, const drape_work *other)
     work.contact_seconds += other->contact_seconds;
     return work;
 }
+
+drape_status drape_solver_status(drape_reason reason)
+{
+    switch (reason) {
+    case DRAPE_REASON_CONVERGED:
+        return DRAPE_OK;
+    case DRAPE_REASON_ERROR_TEST:
+    case DRAPE_REASON_ROUND_OFF:
+        return DRAPE_RETRY_REJECTED;
+    case DRAPE_REASON_SINGULAR:
+        return DRAPE_RETRY_LINEAR;
+    case DRAPE_REASON_NONFINITE:
+        return DRAPE_RETRY_NONFINITE;
+    case DRAPE_REASON_MEMORY:
+        return DRAPE_E_MEMORY;
+    case DRAPE_REASON_SOLVER:
+        return DRAPE_E_SOLVER;
+    default:
+        return DRAPE_RETRY_NONLINEAR;
+    }
+}
+
+drape_reason drape_solver_reason(const drape_solver_code *codes, size_t count, int code)
+{
+    for (size_t i = 0; i < count; i++)
+        if (codes[i].code == code)
+            return codes[i].reason;
+    return DRAPE_REASON_SOLVER;
+}

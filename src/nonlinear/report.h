@@ -3,6 +3,7 @@
 #define DRAPE_NONLINEAR_REPORT_H
 
 #include "base/archive.h"
+#include "base/reason.h"
 #include "nonlinear/system_matrix.h"
 
 /* How one solve ended. */
@@ -31,6 +32,19 @@ typedef struct drape_work {
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
 } drape_work;
+
+/* The status of a step that a solver ended for a reason of its own. */
+drape_status drape_solver_status(drape_reason reason);
+
+/* What a return code of a library of SUNDIALS means. */
+typedef struct drape_solver_code {
+    int code;
+    drape_reason reason;
+} drape_solver_code;
+
+/* The meaning of a code in a table of `count`; DRAPE_REASON_SOLVER if it has no such code: no smaller step
+ * helps. */
+drape_reason drape_solver_reason(const drape_solver_code *codes, size_t count, int code);
 
 /* The counts and times of both, and the equilibrium of `work`. */
 drape_work drape_work_sum(drape_work work, const drape_work *other);
