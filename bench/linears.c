@@ -165,7 +165,7 @@ static void measure_all(FILE *csv, int side, matrix_kind kind)
     problem q = open_problem(side, kind);
     for (int k = 0; drape_linears[k]; k++)
         if (affordable(drape_linears[k], side)) {
-            times t = measure(&q, drape_linears[k]);
+            times t = measure(&q, drape_linear_of(NULL, k, q.model->pattern.n));
             report(csv, side * side, &q, kind, drape_linears[k]->entry.name, &t);
         }
     close_problem(&q);

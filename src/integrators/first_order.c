@@ -497,7 +497,7 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
     }
     if (!status && s->n > 0)
         status = drape_system_matrix_create(
-            arena, system, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER]),
+            arena, system, drape_linear_of(s->ranks, (int)values[DRAPE_FIRST_ORDER_LINEAR_SOLVER], s->n),
             s->model->has_dissipation, 0, &s->linear);
     if (!status && s->n > 0)
         status = drape_ranks_agree(

@@ -680,8 +680,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     drape_status status = drape_arena_status(arena);
     if (status || s->n == 0)
         return status;
-    return drape_radau_matrix_create(arena, system, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                     &s->matrix);
+    return drape_radau_matrix_create(
+        arena, system, drape_linear_of(NULL, (int)values[PARAM_LINEAR_SOLVER], s->n), &s->matrix);
 }
 
 static void destroy(void **state)

@@ -393,8 +393,10 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         status = drape_arena_status(arena);
     if (status || s->common.equation.dofs == 0)
         return status;
-    return drape_system_matrix_create(arena, system, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                      s->common.dissipated != NULL, 0, &s->linear);
+    return drape_system_matrix_create(
+        arena, system,
+        drape_linear_of(NULL, (int)values[PARAM_LINEAR_SOLVER], (int64_t)s->common.equation.dofs),
+        s->common.dissipated != NULL, 0, &s->linear);
 }
 
 static void destroy(void **state)

@@ -674,7 +674,10 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
     } else {
         s->usual.ops = &drape_exact_jacobian_ops;
         status = drape_exact_jacobian_create(arena, system,
-                                             drape_linear_of(s->equation->ranks, (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]), s->searches, (drape_exact_jacobian **)&s->usual.self);
+                                             drape_linear_of(s->equation->ranks,
+                                                             (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER],
+                                                             (int64_t)s->equation->dofs),
+                                             s->searches, (drape_exact_jacobian **)&s->usual.self);
     }
     if (!status)
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);

@@ -234,12 +234,10 @@ static drape_status measure_solver(bench *s, drape_profile *out)
         out->integrator_bytes += s->arena.bytes + drape_linear_bytes(s->linear, s->solver) - before;
         out->solve_seconds = shortest(s, solve);
     }
-    drape_linear_report report = {.ops = s->linear};
+    drape_linear_report report = {0};
     if (s->linear->report)
         s->linear->report(s->solver, &report);
-    out->linear_picked = report.ops->entry.name;
     out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
-    memcpy(out->linear_why, report.why, sizeof out->linear_why);
     drape_linear_destroy(s->linear, &s->solver);
     return DRAPE_OK;
 }
@@ -271,16 +269,20 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
                                    drape_profile *out)
 {
     const double linear = drape_chosen_integrator_value(&sim->chosen, "linear_solver", -1);
+    const drape_linear_ops *entry = linear >= 0 ? drape_linears[(int)linear] : NULL;
+    const int64_t n = 3 * (int64_t)sim->model->free_count;
     bench s = {.ctx = ctx,
                .arena = drape_arena_of(ctx),
                .sim = sim,
-               .linear = linear >= 0 ? drape_linears[(int)linear] : NULL};
+               .linear = entry && n > 0 ? drape_linear_of(NULL, (int)linear, n) : entry};
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
-                           .linear_solver = s.linear ? s.linear->entry.name : "",
+                           .linear_solver = entry ? entry->entry.name : "",
                            .linear_picked = s.linear ? s.linear->entry.name : "",
                            .linear_fallback = "",
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
+    if (entry && entry->pick && n > 0)
+        drape_linear_explain(n, out->linear_why);
     count_bytes(sim, out);
     drape_status status = measure(&s, out);
     drape_arena_free(&s.arena);

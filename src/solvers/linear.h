@@ -26,10 +26,7 @@
 
 typedef struct drape_linear_ops drape_linear_ops;
 
-/* The choice of a solver and its fallbacks. */
 typedef struct drape_linear_report {
-    const drape_linear_ops *ops;      /* the solver: the requested one, or the one that it picked */
-    char why[96];                     /* why it was picked; "" if nothing was picked */
     int64_t fallbacks;                /* matrices that its own method could not factor */
     const drape_linear_ops *fallback; /* the solver that factored them; NULL: none was needed */
 } drape_linear_report;
@@ -42,7 +39,8 @@ struct drape_linear_ops {
     /* It takes memory from the heap during a factorisation, or at the first matrix that needs it. If false,
      * it takes none from the second factorisation on. */
     bool borrows_heap;
-    /* Which solver stands for this one at a number of unknowns; NULL: itself. */
+    /* Which solver stands for this entry at a number of unknowns; an entry with it has no other function.
+     * NULL: itself. */
     const drape_linear_ops *(*pick)(int64_t n);
     /* Creates the solver's state in an arena that stays at its address. The pattern must outlive it.
      * Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; then *state is not set, and the memory taken stays in the
@@ -99,11 +97,15 @@ void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archiv
 void drape_linear_destroy(const drape_linear_ops *ops, void **state);
 size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state);
 
-/* The solver of that number in the table; where ranks share the matrix (pattern->ranks), theirs in place of
- * direct ones. */
-const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number);
+/* The solver that an entry of the table stands for at n unknowns; where ranks share the matrix
+ * (pattern->ranks), theirs in place of direct ones. */
+const drape_linear_ops *drape_linear_of(const drape_ranks *ranks, int number, int64_t n);
 
 /* The solver with the largest best_from that is at most n; if none is, the one with the smallest. */
 const drape_linear_ops *drape_linear_best(int64_t n);
+
+/* Says why it is that one. */
+enum { DRAPE_LINEAR_WHY = 96 };
+void drape_linear_explain(int64_t n, char why[DRAPE_LINEAR_WHY]);
 
 #endif

@@ -156,7 +156,7 @@ static size_t bytes(const void *state)
 static void report(const void *state, drape_linear_report *out)
 {
     const int64_t count = ((const multifrontal *)state)->general.klu_count;
-    *out = (drape_linear_report){.ops = &drape_linear_multifrontal, .fallbacks = count, .fallback = count > 0 ? &drape_linear_klu : NULL};
+    *out = (drape_linear_report){.fallbacks = count, .fallback = count > 0 ? &drape_linear_klu : NULL};
 }
 
 const drape_linear_ops drape_linear_multifrontal = {

@@ -247,8 +247,7 @@ static size_t bytes(const void *state)
 static void report(const void *state, drape_linear_report *out)
 {
     const fallback *f = &((const pcg_state *)state)->fallback;
-    *out = (drape_linear_report){
-        .ops = &drape_linear_pcg, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
+    *out = (drape_linear_report){.fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
 }
 
 const drape_linear_ops drape_linear_pcg = {
