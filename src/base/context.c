@@ -152,6 +152,16 @@ drape_status drape_fail(drape_context *ctx, drape_status status, const char *for
     return status;
 }
 
+drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
+                           ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(ctx, status, pointer, format, args);
+    va_end(args);
+    return status;
+}
+
 const drape_term_ops *drape_context_term_ops(const drape_context *ctx, bool of_seams, int index)
 {
     for (int i = 0; i < ctx->host_term_count; i++) {
@@ -179,26 +189,13 @@ const drape_entry *drape_context_collider(const drape_context *ctx, int index)
     return index < ctx->host_collider_count ? &ctx->host_colliders[index].entry : NULL;
 }
 
-drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
-                           ...)
+const char *drape_format(char text[DRAPE_POINTER_SIZE], const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    fail(ctx, status, pointer, format, args);
+    vsnprintf(text, DRAPE_POINTER_SIZE, format, args);
     va_end(args);
-    return status;
-}
-
-drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
-                              ...)
-{
-    char at[sizeof ctx->pointer];
-    va_list args;
-    snprintf(at, sizeof at, "%s/%s", pointer, key);
-    va_start(args, format);
-    fail(ctx, DRAPE_E_ARGUMENT, at, format, args);
-    va_end(args);
-    return DRAPE_E_ARGUMENT;
+    return text;
 }
 
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,

@@ -9,6 +9,7 @@
 #include "drape/extend.h"
 
 #define DRAPE_MESSAGE_SIZE       1024
+#define DRAPE_POINTER_SIZE       256 /* of a JSON pointer, with its zero byte */
 #define DRAPE_MAX_HOST_TERMS     32
 #define DRAPE_MAX_HOST_COLLIDERS 32
 
@@ -16,9 +17,10 @@ struct drape_context {
     drape_context_def def;
     char message[DRAPE_MESSAGE_SIZE];
     drape_status status; /* with which it was set */
-    char pointer[256];   /* JSON pointer of the last fault, from which the scene reader finds line and column;
-                          "": none */
-    char text[DRAPE_MESSAGE_SIZE];                   /* the message without its place */
+    char
+        pointer[DRAPE_POINTER_SIZE]; /* JSON pointer of the last fault, from which the scene reader finds line
+                                       * and column; "": none */
+    char text[DRAPE_MESSAGE_SIZE];   /* the message without its place */
     drape_term_ops host_terms[DRAPE_MAX_HOST_TERMS]; /* copies, with the size of this version */
     int host_term_count;
     drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
@@ -47,13 +49,20 @@ char *drape_copy_text(drape_context *ctx, const char *text);
 void drape_make_printable(char *text);
 
 /* Set the message and return status. drape_fail_at also names the place by its JSON pointer: message
- * "pointer: text". */
+ * "pointer: text". drape_refuse does that with DRAPE_E_ARGUMENT, drape_fail_below likewise at a key of the object
+ * at `pointer`: "/seams/0/name" for "name". */
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
-/* As drape_fail_at with DRAPE_E_ARGUMENT, at a key of the object at `pointer`: "/seams/0/name" for "name". */
-drape_status drape_fail_below(drape_context *ctx, const char *pointer, const char *key, const char *format,
-                              ...) DRAPE_PRINTF(4, 5);
+#define drape_refuse(ctx, pointer, ...) drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, __VA_ARGS__)
+#define drape_fail_below(ctx, pointer, key, ...)                                                             \
+    drape_refuse(ctx, DRAPE_FORMAT("%s/%s", pointer, key), __VA_ARGS__)
+
+/* A short text, such as a JSON pointer, that is made in place: valid until the end of the block, and cut off if it
+ * is longer. */
+#define DRAPE_FORMAT(...) drape_format((char[DRAPE_POINTER_SIZE]){0}, __VA_ARGS__)
+const char *drape_format(char text[DRAPE_POINTER_SIZE], const char *format, ...) DRAPE_PRINTF(2, 3);
+
 /* For the status of a user-defined function, before whose call the message was cleared: if it failed without
  * setting a message, sets this one. Returns status. */
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,

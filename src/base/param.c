@@ -89,8 +89,7 @@ static size_t distance_from_part(const char *word, const char *name)
     size_t best = SIZE_MAX;
     for (const char *part = name;; part++) {
         const size_t length = strcspn(part, "._");
-        char one[MAX_WORD + 1];
-        snprintf(one, sizeof one, "%.*s", (int)length, part);
+        const char *one = DRAPE_FORMAT("%.*s", (int)length, part);
         const size_t distance = edit_distance(word, one);
         best = distance < best ? distance : best;
         part += length;
@@ -239,8 +238,7 @@ drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const d
 {
     char takes[RANGE_SIZE];
     drape_param_takes_text(param, takes, sizeof takes);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s", given,
-                         param->name, takes);
+    return drape_refuse(ctx, pointer, "%.100s is not allowed; %s is %s", given, param->name, takes);
 }
 
 static drape_status refuse_number(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -281,12 +279,12 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
     double axis = drape_hypot(drape_hypot(v[0], v[1]), v[2]),
            angle = setting->vector_count == 4 ? v[3] : axis;
     if (setting->vector_count == 3 && !isfinite(axis * axis)) /* later code takes the square */
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "the rotation vector is too long");
+        return drape_refuse(ctx, pointer, "the rotation vector is too long");
     if (!in_range(param, angle) || !isfinite(axis))
         return refuse_number(ctx, pointer, param, isfinite(axis) ? angle : axis);
     if (axis == 0 && angle != 0)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                             "the axis of a rotation by %.10g degrees is 0 0 0; it must not be zero", angle);
+        return drape_refuse(ctx, pointer,
+                            "the axis of a rotation by %.10g degrees is 0 0 0; it must not be zero", angle);
     for (int k = 0; k < 3; k++)
         value[k] = axis > 0 ? v[k] / axis * angle : 0;
     return DRAPE_OK;
@@ -296,13 +294,13 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
 static drape_status refuse_point(drape_context *ctx, const char *pointer, const drape_param *param, size_t i,
                                  int k, double number, double before)
 {
-    char at[300], given[40], least[40];
-    snprintf(at, sizeof at, "%.250s/%zu/%d", pointer, i, k);
+    char given[40], least[40];
+    const char *at = DRAPE_FORMAT("%.250s/%zu/%d", pointer, i, k);
     drape_number_text(number, given, sizeof given);
     drape_number_text(before, least, sizeof least);
     trim_exponent(given), trim_exponent(least);
-    return drape_fail_at(
-        ctx, DRAPE_E_ARGUMENT, at,
+    return drape_refuse(
+        ctx, at,
         "%s is not allowed; the %s number of a point of %s is above that of the point before, "
         "%s, and in [%s, %s]",
         given, k == 0 ? "first" : "second", param->name, least, SHOWN(k == 0 ? param->min : POINT_MIN),
@@ -315,8 +313,7 @@ static drape_status points_value(drape_context *ctx, const char *pointer, const 
 {
     const size_t count = setting->vector_count;
     const double *v = setting->vector;
-    char given[48];
-    snprintf(given, sizeof given, count ? "an array of %zu numbers" : "an empty array", count);
+    const char *given = DRAPE_FORMAT(count ? "an array of %zu numbers" : "an empty array", count);
     if (count == 0 || count % 2 || setting->number != 2)
         return drape_param_refuse(ctx, pointer, param, given);
     for (size_t i = 0; i < count / 2; i++) {
@@ -335,12 +332,11 @@ static drape_status vector_value(drape_context *ctx, const char *pointer, const 
 {
     const size_t count = setting->vector_count;
     const bool pairs = setting->number == 2;
-    char given[40];
     if (param->kind == DRAPE_PARAM_POINTS)
         return points_value(ctx, pointer, param, setting, value);
     if (param->kind == DRAPE_PARAM_TURN && !pairs && (count == 3 || count == 4))
         return turn_value(ctx, pointer, param, setting, value);
-    snprintf(given, sizeof given, count ? "an array of %zu" : "an empty array", pairs ? count / 2 : count);
+    const char *given = DRAPE_FORMAT(count ? "an array of %zu" : "an empty array", pairs ? count / 2 : count);
     if (param->kind != DRAPE_PARAM_VECTOR || pairs || count != 3)
         return drape_param_refuse(ctx, pointer, param, given);
     for (int k = 0; k < 3; k++) {
@@ -362,7 +358,7 @@ static drape_status text_value(drape_context *ctx, const char *pointer, const dr
             break;
         }
     const bool yes = strcmp(text, "true") == 0, boolean = yes || strcmp(text, "false") == 0;
-    char given[80], takes[RANGE_SIZE];
+    char takes[RANGE_SIZE];
     size_t count = 0;
     for (; param->kind == DRAPE_PARAM_CHOICE && param->choices[count]; count++)
         if (strcmp(param->choices[count], text) == 0) {
@@ -373,13 +369,13 @@ static drape_status text_value(drape_context *ctx, const char *pointer, const dr
         *value = param->kind == DRAPE_PARAM_BOOLEAN && yes;
         return DRAPE_OK;
     }
-    snprintf(given, sizeof given, boolean ? "%.60s" : "\"%.60s\"", text);
+    const char *given = DRAPE_FORMAT(boolean ? "%.60s" : "\"%.60s\"", text);
     if (count == 0)
         return drape_param_refuse(ctx, pointer, param, given);
     drape_param_takes_text(param, takes, sizeof takes);
     const char *meant = drape_did_you_mean(text, param->choices, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s is not allowed; %s is %s%s%s%s", given,
-                         param->name, takes, DRAPE_DID_YOU_MEAN(meant));
+    return drape_refuse(ctx, pointer, "%s is not allowed; %s is %s%s%s%s", given, param->name, takes,
+                        DRAPE_DID_YOU_MEAN(meant));
 }
 
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -400,20 +396,19 @@ drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const 
     for (size_t i = 0; i < count && used < sizeof list; i++)
         used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", known[i]);
     const char *meant = drape_did_you_mean(name, known, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"; %s%s%s%s%s", name,
-                         meant ? "did you mean \"" : "", meant ? meant : "", meant ? "\"? " : "",
-                         !count  ? "there are no parameters"
-                         : meant ? "Known: "
-                                 : "known: ",
-                         list);
+    return drape_refuse(ctx, pointer, "unknown key \"%.60s\"; %s%s%s%s%s", name,
+                        meant ? "did you mean \"" : "", meant ? meant : "", meant ? "\"? " : "",
+                        !count  ? "there are no parameters"
+                        : meant ? "Known: "
+                                : "known: ",
+                        list);
 }
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
 {
     char takes[RANGE_SIZE];
     drape_param_takes_text(param, takes, sizeof takes);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s; %s", param->name,
-                         param->help, takes);
+    return drape_refuse(ctx, pointer, "\"%s\" is missing: %s; %s", param->name, param->help, takes);
 }
 
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_entry *entry,
@@ -424,8 +419,7 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
     for (int i = 0; i < entry->param_count; i++)
         drape_param_default(&params[i], values + drape_param_place(params, i));
     for (size_t s = 0; s < setting_count; s++) {
-        char at[256];
-        snprintf(at, sizeof at, "%s/%.80s", pointer, settings[s].name);
+        const char *at = DRAPE_FORMAT("%s/%.80s", pointer, settings[s].name);
         int i = drape_param_find(params, entry->param_count, settings[s].name);
         if (i < 0 && drape_retired(ctx, at, entry->name, settings[s].name))
             continue;

@@ -60,5 +60,5 @@ drape_status drape_registry_choose(drape_context *ctx, const drape_registry *reg
     if (*index >= 0)
         return DRAPE_OK;
     drape_registry_unknown(registry, ctx, name, text);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s", text);
+    return drape_refuse(ctx, pointer, "%s", text);
 }

@@ -134,7 +134,7 @@ drape_status drape_term_refuse(drape_term_builder *builder, const char *format, 
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    return drape_fail_at(builder->model->ctx, DRAPE_E_ARGUMENT, builder->pointer, "%s", text);
+    return drape_refuse(builder->model->ctx, builder->pointer, "%s", text);
 }
 
 void drape_term_timed(drape_term_builder *builder, double from, double to)
@@ -296,8 +296,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     drape_cloth *cloth = &model->cloths[c];
     for (int32_t i = 0; i < model->term_count && !ops->external; i++) /* loads may act on several places */
         if (model->terms[i].cloth == c && model->terms[i].ops == ops)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
-                                 def->type);
+            return drape_refuse(model->ctx, pointer, "the term \"%s\" is named twice", def->type);
     drape_status status = begin_term(model, c, -1, pointer, ops, def);
     if (status)
         return status;
@@ -344,17 +343,16 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     const bool has_gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
     const drape_term_ops *ops;
     drape_status status = DRAPE_OK;
-    char pointer[128];
     model->cloths[c].laws = drape_arena_take(&model->arena, def->term_count + count_implied(model->ctx),
                                              sizeof *model->cloths[c].laws);
     if (!model->cloths[c].laws)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->term_count; i++) {
-        snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%zu", (int)c, i);
+        const char *pointer = DRAPE_FORMAT("/cloth/%d/terms/%zu", (int)c, i);
         status = find_term(model->ctx, &drape_term_registry, pointer, def->terms[i].type, &ops);
         if (!status && ops->from_scene_gravity)
-            return drape_fail_at(
-                model->ctx, DRAPE_E_ARGUMENT, pointer,
+            return drape_refuse(
+                model->ctx, pointer,
                 "%s acts whenever the scene's \"gravity\" is not zero; leave it out of the terms",
                 ops->entry.name);
         if (!status)
@@ -388,9 +386,8 @@ static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_
     drape_model_seam *seam = &model->seams[s];
     const drape_cloth *side[2] = {&model->cloths[seam->cloth[0]], &model->cloths[seam->cloth[1]]};
     const drape_term_ops *ops;
-    char pointer[64], at[80];
-    snprintf(pointer, sizeof pointer, "/seams/%d", (int)s);
-    snprintf(at, sizeof at, "%s/type", pointer);
+    const char *pointer = DRAPE_FORMAT("/seams/%d", (int)s);
+    const char *at = DRAPE_FORMAT("%s/type", pointer);
     drape_status status = find_term(model->ctx, &drape_seam_registry, at, def->type, &ops);
     seam->term = model->term_count;
     if (!status)
@@ -442,7 +439,6 @@ static drape_status connect_laws(drape_model *model, int32_t c)
 {
     drape_cloth *cloth = &model->cloths[c];
     bool measured = false;
-    char pointer[64];
     for (int32_t i = 0; i < model->term_count; i++) {
         drape_term *term = &model->terms[i];
         if (term->cloth != c || !term->ops->measure)
@@ -455,11 +451,11 @@ static drape_status connect_laws(drape_model *model, int32_t c)
         find_damping(model, term);
     }
     model->has_laws = model->has_laws || cloth->law_count > 0;
-    snprintf(pointer, sizeof pointer, "/cloth/%d/terms", (int)c);
+    const char *pointer = DRAPE_FORMAT("/cloth/%d/terms", (int)c);
     if (cloth->law_count > 0 && !measured)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "\"%s\" has nothing to act on: no other term here has a strain measure",
-                             cloth->laws[0]->ops->entry.name);
+        return drape_refuse(model->ctx, pointer,
+                            "\"%s\" has nothing to act on: no other term here has a strain measure",
+                            cloth->laws[0]->ops->entry.name);
     return DRAPE_OK;
 }
 

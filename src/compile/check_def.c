@@ -4,7 +4,6 @@
 #include "compile/stages.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "model/scene.h"
@@ -17,7 +16,7 @@ typedef struct checker {
 
 static drape_status refuse_null(checker *c, const char *what)
 {
-    return drape_fail_at(c->ctx, DRAPE_E_ARGUMENT, c->at.text, "%s is NULL", what);
+    return drape_refuse(c->ctx, c->at.text, "%s is NULL", what);
 }
 
 static drape_status check_value(checker *c, const drape_scene_key *key, const char *def)
@@ -46,8 +45,8 @@ static drape_status check_array(checker *c, const drape_scene_key *key, const ch
     if (key->at_most && count > key->at_most) {
         char takes[128];
         drape_scene_takes_text(key, takes, sizeof takes);
-        return drape_fail_at(c->ctx, DRAPE_E_ARGUMENT, c->at.text, "an array of %zu is not allowed; %s is %s",
-                             count, key->param.name, takes);
+        return drape_refuse(c->ctx, c->at.text, "an array of %zu is not allowed; %s is %s", count,
+                            key->param.name, takes);
     }
     const bool has_texts = key->shape == DRAPE_SCENE_LIST && key->param.kind == DRAPE_PARAM_TEXT;
     const drape_scene_key text = {.param = {.name = "an element",

@@ -4,7 +4,6 @@
 #include "compile/stages.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/vec3.h"
@@ -45,10 +44,9 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
 {
     const drape_collider_def *def = &scene->colliders[i];
     drape_collider *to = &model->colliders[i];
-    char pointer[64], type[80];
     int kind = 0;
-    snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
-    snprintf(type, sizeof type, "%s/type", pointer);
+    const char *pointer = DRAPE_FORMAT("/colliders/%zu", i);
+    const char *type = DRAPE_FORMAT("%s/type", pointer);
     drape_status status = drape_compile_name(model, pointer, "collider", "colliders", def->name, (int32_t)i,
                                              &to->name, sizeof *to);
     to->index = (int32_t)i;

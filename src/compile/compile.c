@@ -9,14 +9,12 @@
 #include "model/scene.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 drape_status drape_compile_name(drape_model *model, const char *pointer, const char *kind, const char *many,
                                 const char *given, int32_t index, char **name, size_t size)
 {
-    char own[32];
-    snprintf(own, sizeof own, "%s%d", kind, (int)index);
+    const char *own = DRAPE_FORMAT("%s%d", kind, (int)index);
     const char *wanted = given ? given : own;
     for (size_t i = 1; i <= (size_t)index; i++)
         if (strcmp(*(char **)(void *)((char *)name - i * size), wanted) == 0)
@@ -82,11 +80,10 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
 {
     const drape_cloth_def *def = &scene->cloths[c];
     drape_cloth *cloth = &model->cloths[c];
-    char pointer[64], at[96];
-    snprintf(pointer, sizeof pointer, "/cloth/%d", (int)c);
+    const char *pointer = DRAPE_FORMAT("/cloth/%d", (int)c);
     drape_status status =
         drape_compile_name(model, pointer, "cloth", "cloths", def->name, c, &cloth->name, sizeof *cloth);
-    snprintf(at, sizeof at, "%s/mesh", pointer);
+    const char *at = DRAPE_FORMAT("%s/mesh", pointer);
     if (!status)
         status = drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh);
     if (!status)
@@ -153,7 +150,7 @@ static drape_status gather(drape_model *model)
 static drape_status compile_cloths(drape_model *model, const drape_scene_def *def)
 {
     if (def->cloth_count == 0)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth", "the scene has no cloth");
+        return drape_refuse(model->ctx, "/cloth", "the scene has no cloth");
     model->cloths = drape_arena_take(&model->arena, def->cloth_count, sizeof *model->cloths);
     if (!model->cloths)
         return DRAPE_E_MEMORY;
@@ -170,8 +167,8 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
         triangles += model->cloths[c].mesh.triangle_count;
         edges += model->cloths[c].mesh.edge_count;
         if (nodes > DRAPE_MAX_NODES)
-            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
-                                   "the cloths have more than %d nodes together", DRAPE_MAX_NODES);
+            status = drape_refuse(model->ctx, "/cloth", "the cloths have more than %d nodes together",
+                                  DRAPE_MAX_NODES);
     }
     model->node_count = (int32_t)nodes;
     model->triangle_count = (int32_t)triangles;

@@ -6,7 +6,6 @@
 #include "model/track.h"
 
 #include <math.h>
-#include <stdio.h>
 
 enum { IMPLICIT, LAGGED };
 static const char *const frictions[] = {"implicit", "lagged", NULL};
@@ -227,8 +226,7 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
     double all[3][DRAPE_MAX_PARAMS];
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < 3; i++) {
-        char pointer[32];
-        snprintf(pointer, sizeof pointer, "/%s", names[i]);
+        const char *pointer = DRAPE_FORMAT("/%s", names[i]);
         if (i == 0 || defs[i].settings) /* the others are off unless they are given */
             status = drape_params_resolve(model->ctx, pointer, registries[i]->entries[0], defs[i].settings,
                                           defs[i].setting_count, all[i]);

@@ -66,9 +66,8 @@ static drape_status find_pins(const place *p, const char *name, drape_model_even
 static drape_status choose(const place *p, const char *key, const char *text, int *out)
 {
     const drape_setting setting = {.name = key, .text = text};
-    char at[96];
     double value = 0;
-    snprintf(at, sizeof at, "%s/%s", p->pointer, key);
+    const char *at = DRAPE_FORMAT("%s/%s", p->pointer, key);
     const drape_status status =
         text ? drape_param_value(p->ctx, at, &drape_scene_key_of(&drape_form_event, key)->param, &setting,
                                  &value)
@@ -129,11 +128,11 @@ static drape_status check_name(const place *p, const char *name)
 static drape_status compile_event(drape_model *model, size_t i, const drape_event_def *def)
 {
     drape_model_event *to = &model->events[i];
-    char pointer[64], type[80];
+    char pointer[64];
     int function = 0;
     const place p = {.ctx = model->ctx, .arena = &model->arena, .model = model, .pointer = pointer};
     snprintf(pointer, sizeof pointer, "/events/%zu", i);
-    snprintf(type, sizeof type, "%s/type", pointer);
+    const char *type = DRAPE_FORMAT("%s/type", pointer);
     drape_status status =
         drape_compile_name(model, pointer, "event", "events", def->name, (int32_t)i, &to->name, sizeof *to);
     if (!status)

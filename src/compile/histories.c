@@ -14,9 +14,9 @@ static drape_status check(drape_model *model, const char *pointer, const drape_s
 {
     const drape_history_def *def = &scene->histories[i];
     if (def->time_count == 0 || def->time_count != def->value_count)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "%zu times and %zu values; there is one value for each time, and at least one",
-                             def->time_count, def->value_count);
+        return drape_refuse(model->ctx, pointer,
+                            "%zu times and %zu values; there is one value for each time, and at least one",
+                            def->time_count, def->value_count);
     for (size_t k = 0; k < def->time_count; k++) {
         const char *list = "times", *fault = NULL;
         char key[40];
@@ -71,8 +71,7 @@ drape_status drape_compile_histories(drape_model *model, const drape_scene_def *
     drape_status status = model->histories ? DRAPE_OK : DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->history_count; i++) {
         const drape_history_def *from = &def->histories[i];
-        char pointer[64];
-        snprintf(pointer, sizeof pointer, "/histories/%zu", i);
+        const char *pointer = DRAPE_FORMAT("/histories/%zu", i);
         status = check(model, pointer, def, i);
         if (!status)
             status = add(model, from->name, from->time_count, from->times, from->values,
@@ -83,8 +82,8 @@ drape_status drape_compile_histories(drape_model *model, const drape_scene_def *
 
 static drape_status refuse_timed(drape_model *model, const char *pointer, const drape_term *term)
 {
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                         "%s has a course in time of its own, and no history", term->ops->entry.name);
+    return drape_refuse(model->ctx, pointer, "%s has a course in time of its own, and no history",
+                        term->ops->entry.name);
 }
 
 drape_status drape_compile_history_named(drape_model *model, const char *pointer, const char *name,
@@ -105,8 +104,8 @@ drape_status drape_compile_history_named(drape_model *model, const char *pointer
     if (term->history)
         return DRAPE_OK;
     const char *meant = drape_did_you_mean(name, names, known);
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "there is no history \"%.60s\"%s%.60s%s",
-                         name, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+    return drape_refuse(model->ctx, pointer, "there is no history \"%.60s\"%s%.60s%s", name,
+                        meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
 }
 
 drape_status drape_compile_history_of(drape_model *model, const char *pointer, const drape_entry_def *def,
@@ -122,10 +121,9 @@ drape_status drape_compile_history_of(drape_model *model, const char *pointer, c
         if (strcmp(def->settings[i].name, DRAPE_HISTORY_PARAM) == 0)
             name = def->settings[i].text;
     const double rise = ramp < 0 ? 0 : term->params[drape_param_place(entry->params, ramp)];
-    char at[160];
-    snprintf(at, sizeof at, "%s/%s", pointer, DRAPE_HISTORY_PARAM);
+    const char *at = DRAPE_FORMAT("%s/%s", pointer, DRAPE_HISTORY_PARAM);
     if (name && rise > 0)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "a load has a history or a ramp, not both");
+        return drape_refuse(model->ctx, at, "a load has a history or a ramp, not both");
     if (name)
         return drape_compile_history_named(model, at, name, term);
     if (!(rise > 0))

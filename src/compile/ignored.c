@@ -1,7 +1,6 @@
 /* ignored.c: which cloths pass through which colliders and cloths. */
 #include "compile/stages.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* A name may be that of a collider and of a cloth: then both are meant. Pairs of cloths ignore each other. */
@@ -23,14 +22,12 @@ static drape_status ignore(drape_model *model, int32_t cloth, const char *pointe
     }
     return found ? drape_check_cancel_after(model->ctx,
                                             8 * (size_t)(model->collider_count + model->cloth_count))
-                 : drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                                 "there is no collider and no cloth \"%.60s\"", name);
+                 : drape_refuse(model->ctx, pointer, "there is no collider and no cloth \"%.60s\"", name);
 }
 
 drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *def)
 {
     const int32_t rows = model->collider_count + model->cloth_count;
-    char pointer[64];
     drape_status status = DRAPE_OK;
     bool any = false;
     for (size_t c = 0; c < def->cloth_count; c++)
@@ -52,7 +49,7 @@ drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *de
                (size_t)model->cloth_count);
     for (int32_t c = 0; c < model->cloth_count; c++)
         for (size_t i = 0; !status && i < def->cloths[c].ignore_count; i++) {
-            snprintf(pointer, sizeof pointer, "/cloth/%d/ignore/%zu", (int)c, i);
+            const char *pointer = DRAPE_FORMAT("/cloth/%d/ignore/%zu", (int)c, i);
             status = ignore(model, c, pointer, def->cloths[c].ignore[i]);
         }
     return status;

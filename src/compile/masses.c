@@ -3,7 +3,6 @@
 #include "compile/stages.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 /* One item of "masses". */
@@ -37,14 +36,12 @@ drape_status drape_compile_masses(drape_model *model, const char *pointer, const
     else
         memcpy(item.mass, cloth->material_mass, count * sizeof *item.mass);
     for (size_t i = 0; !status && i < def->mass_count; i++) {
-        char at[128];
-        snprintf(at, sizeof at, "%s/masses/%zu", pointer, i);
+        const char *at = DRAPE_FORMAT("%s/masses/%zu", pointer, i);
         item.def = &def->masses[i];
         memset(item.taken, 0, count);
         if (isnan(item.def->add) == isnan(item.def->mass))
-            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                                   "exactly one of add, mass is needed; given: %s",
-                                   isnan(item.def->add) ? "none" : "both");
+            status = drape_refuse(model->ctx, at, "exactly one of add, mass is needed; given: %s",
+                                  isnan(item.def->add) ? "none" : "both");
         else
             status = drape_select_nodes(&(drape_selection){.ctx = model->ctx,
                                                            .pointer = at,

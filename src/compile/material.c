@@ -6,7 +6,6 @@
 #include "compile/stages.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 enum {
@@ -85,8 +84,8 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
         return DRAPE_OK;
     }
     if (given != 1)
-        return drape_fail_at(
-            ctx, DRAPE_E_ARGUMENT, pointer,
+        return drape_refuse(
+            ctx, pointer,
             "%d of \"density\", \"areal_density\", \"total_mass\" are given; exactly one is needed", given);
     *mass = !isnan(total) ? total : area * (!isnan(areal) ? areal : density * values[THICKNESS]);
     return DRAPE_OK;
@@ -160,9 +159,8 @@ static drape_status take_fabric(drape_model *model, const drape_cloth_def *def, 
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth)
 {
-    char at[256];
     double values[PARAM_COUNT], mass = 0;
-    snprintf(at, sizeof at, "%s/material", pointer);
+    const char *at = DRAPE_FORMAT("%s/material", pointer);
     drape_status status = drape_params_resolve(model->ctx, at, &drape_material_entry, def->material,
                                                def->material_count, values);
     double area = 0;

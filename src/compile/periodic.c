@@ -57,8 +57,7 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
                               drape_arena *scratch, side *s)
 {
     const drape_mesh *mesh = &p->cloth->mesh;
-    char pointer[128];
-    snprintf(pointer, sizeof pointer, "%s/%s", p->pointer, key);
+    const char *pointer = DRAPE_FORMAT("%s/%s", p->pointer, key);
     s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
     s->taken = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->taken);
     const drape_selection selection = {.ctx = p->model->ctx,
@@ -83,8 +82,8 @@ static drape_status refuse_pair(const pairing *p, int32_t node, const double *at
     for (int32_t i = 0; i < p->to.count; i++)
         if (distance(x + 3 * (size_t)p->to.node[i], at) < distance(x + 3 * (size_t)nearest, at))
             nearest = p->to.node[i];
-    return drape_fail_at(
-        p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+    return drape_refuse(
+        p->model->ctx, p->pointer,
         "node %d displaced at rest as its edge is has no node of the other edge at (%g %g %g) "
         "m; the nearest, node %d, is %g m away",
         (int)node, at[0], at[1], at[2], (int)nearest, distance(x + 3 * (size_t)nearest, at));
@@ -147,9 +146,9 @@ static drape_status check_boundary(const pairing *p, drape_arena *scratch)
     for (int s = 0; s < 2; s++)
         for (int32_t i = 0; i < sides[s]->count; i++)
             if (!outer[sides[s]->node[i]])
-                return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
-                                     "node %d is inside the mesh: periodic edges are of its boundary",
-                                     (int)sides[s]->node[i]);
+                return drape_refuse(p->model->ctx, p->pointer,
+                                    "node %d is inside the mesh: periodic edges are of its boundary",
+                                    (int)sides[s]->node[i]);
     return DRAPE_OK;
 }
 
@@ -162,12 +161,11 @@ static drape_status find_pairs(pairing *p, drape_arena *scratch)
         return status;
     for (int32_t i = 0; i < p->from.count; i++)
         if (p->to.taken[p->from.node[i]])
-            return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer, "node %d is in both edges",
-                                 (int)p->from.node[i]);
+            return drape_refuse(p->model->ctx, p->pointer, "node %d is in both edges", (int)p->from.node[i]);
     if (p->from.count != p->to.count)
-        return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
-                             "one edge has %d nodes and the other %d: they are paired one by one",
-                             (int)p->from.count, (int)p->to.count);
+        return drape_refuse(p->model->ctx, p->pointer,
+                            "one edge has %d nodes and the other %d: they are paired one by one",
+                            (int)p->from.count, (int)p->to.count);
     status = check_boundary(p, scratch);
     return status ? status : match(p, scratch);
 }
@@ -195,11 +193,11 @@ static drape_status stretch(const pairing *p, const double now[3], double *x)
     if (!(vec3_norm(more) > SLIP * p->model->length))
         return DRAPE_OK;
     if (!(sqrt(square) > SLIP * p->model->length))
-        return drape_fail_at(p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
-                             "the edges coincide at rest, so the period is 0 0 0 or that of a \"start\"");
+        return drape_refuse(p->model->ctx, p->pointer,
+                            "the edges coincide at rest, so the period is 0 0 0 or that of a \"start\"");
     if (!(vec3_norm(p->def->period) > SLIP * p->model->length))
-        return drape_fail_at(
-            p->model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+        return drape_refuse(
+            p->model->ctx, p->pointer,
             "the period 0 0 0 would leave the cloth no width; the edges of a closed tube meet "
             "in its \"start\"");
     for (int32_t i = 0; i < mesh->node_count; i++) {
@@ -224,8 +222,8 @@ static drape_status place(pairing *p, bool may_move)
     const double *by = given && !may_move ? p->def->period : now;
     for (int32_t i = 0; i < p->from.count; i++)
         if (!(off(p, i, x, by) <= SLIP * model->length))
-            return drape_fail_at(
-                model->ctx, DRAPE_E_ARGUMENT, p->pointer,
+            return drape_refuse(
+                model->ctx, p->pointer,
                 "at the start node %d is %g m from where the period (%g %g %g) m puts node %d",
                 (int)p->partner[i], off(p, i, x, by), by[0], by[1], by[2], (int)p->from.node[i]);
     if (!given || !may_move)
@@ -378,11 +376,9 @@ drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *d
 static drape_status refuse_nodes(const drape_model *m, int32_t a, int32_t b, const char *what)
 {
     const int32_t c = drape_model_cloth_of(m, a), first = m->cloths[c].first_node;
-    char pointer[64];
-    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)c);
-    return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer,
-                         "nodes %d and %d of periodic edges are the same node, but %s", (int)(a - first),
-                         (int)(b - first), what);
+    const char *pointer = DRAPE_FORMAT("/cloth/%d/periodic", (int)c);
+    return drape_refuse(m->ctx, pointer, "nodes %d and %d of periodic edges are the same node, but %s",
+                        (int)(a - first), (int)(b - first), what);
 }
 
 drape_status drape_compile_pinned_images(const drape_model *m)
@@ -545,9 +541,8 @@ static drape_status find_twins(const drape_model *m, const drape_term *term, boo
 /* who: what the cloth of periodic edges has beside them. */
 static drape_status refuse_cloth(const drape_model *m, int32_t cloth, const char *who, const char *why)
 {
-    char pointer[64];
-    snprintf(pointer, sizeof pointer, "/cloth/%d/periodic", (int)cloth);
-    return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, pointer, "%s %s", who, why);
+    const char *pointer = DRAPE_FORMAT("/cloth/%d/periodic", (int)cloth);
+    return drape_refuse(m->ctx, pointer, "%s %s", who, why);
 }
 
 static bool is_periodic(const drape_model *m, const drape_cloth *cloth)
@@ -631,7 +626,7 @@ static drape_status couple_images(drape_model *m)
     const int64_t pairs = visit_couplings(m, couplings, count, NULL);
     drape_status status = DRAPE_OK;
     if (pairs > INT32_MAX)
-        status = drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, "/cloth", "periodic edges have too many nodes");
+        status = drape_refuse(m->ctx, "/cloth", "periodic edges have too many nodes");
     else
         m->image_coupled = drape_arena_take(&m->arena, 2 * (size_t)pairs, sizeof *m->image_coupled);
     if (!status && !m->image_coupled)

@@ -127,11 +127,11 @@ static bool tracks_agree(const drape_model *model, int32_t a, int32_t b)
 static drape_status refuse_motions(const drape_model *model, const char *at, int32_t node, const double *n,
                                    const drape_pin *other)
 {
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                         "node %d is held along (%g %g %g) by this pin and by \"%s\", which moves "
-                         "differently",
-                         (int)(node - model->cloths[other->cloth].first_node), n[0] + 0.0, n[1] + 0.0,
-                         n[2] + 0.0, other->name); /* + 0.0: no -0 */
+    return drape_refuse(model->ctx, at,
+                        "node %d is held along (%g %g %g) by this pin and by \"%s\", which moves "
+                        "differently",
+                        (int)(node - model->cloths[other->cloth].first_node), n[0] + 0.0, n[1] + 0.0,
+                        n[2] + 0.0, other->name); /* + 0.0: no -0 */
 }
 
 /* ---- Nodes of pins ---- */
@@ -150,8 +150,7 @@ static drape_status add_direction(const pin_place *pin, const char *key, int32_t
     }
     const double length = vec3_norm(n);
     if (other >= 0 && (all->count == 3 || !(length > PARALLEL))) {
-        char at[192];
-        snprintf(at, sizeof at, "%s/%s", pin->pointer, key);
+        const char *at = DRAPE_FORMAT("%s/%s", pin->pointer, key);
         return moves_alike(pin->model, direction, track, all)
                    ? DRAPE_OK
                    : refuse_motions(pin->model, at, node, direction, &pin->model->pins[all->pin[other]]);
@@ -358,13 +357,12 @@ static drape_status check_both(const drape_model *model, const pin_place *pin)
             continue;
         for (int i = 0; i < all->count; i++) {
             const drape_pin *first = &model->pins[all->pin[i]];
-            char at[64];
             if (moves_alike(model, all->normal[i], track, all))
                 continue;
             while (first > model->pins && first[-1].cloth == first->cloth)
                 first--;
-            snprintf(at, sizeof at, "/cloth/%d/pins/%d", (int)first->cloth,
-                     (int)(&model->pins[all->pin[i]] - first));
+            const char *at = DRAPE_FORMAT("/cloth/%d/pins/%d", (int)first->cloth,
+                                          (int)(&model->pins[all->pin[i]] - first));
             return refuse_motions(model, at, node, all->normal[i], full_pin_of(model, node));
         }
     }
@@ -452,12 +450,11 @@ enum { UNKNOWN = -2 }; /* the turns of an edge */
 
 static drape_status refuse_turns(const drape_model *model, int32_t c, const int32_t *end)
 {
-    char at[64];
-    snprintf(at, sizeof at, "/cloth/%d/pins", (int)c);
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at,
-                         "pins that turn differently clamp the edge between nodes %d and %d; let one pin "
-                         "clamp it",
-                         (int)end[0], (int)end[1]);
+    const char *at = DRAPE_FORMAT("/cloth/%d/pins", (int)c);
+    return drape_refuse(model->ctx, at,
+                        "pins that turn differently clamp the edge between nodes %d and %d; let one pin "
+                        "clamp it",
+                        (int)end[0], (int)end[1]);
 }
 
 /* Gives the edges between nodes of a pin that clamps its turns. held: (node_count) 0. */

@@ -4,7 +4,6 @@
 #include "geometry/embed.h"
 
 #include <math.h>
-#include <stdio.h>
 
 /* The limit is also the sign that both meshes are not at the same place. */
 static drape_status bind_vertices(drape_model *model, const drape_mesh_source *source, const drape_bvh *tree,
@@ -33,9 +32,8 @@ static drape_status bind_cloth(drape_model *model, int32_t c, const drape_scene_
 {
     const drape_render_mesh_def *def = &scene->cloths[c].render_mesh;
     drape_cloth *cloth = &model->cloths[c];
-    char pointer[64], place[80];
-    snprintf(pointer, sizeof pointer, "/cloth/%d/render_mesh", (int)c);
-    snprintf(place, sizeof place, "%s%s", pointer, def->mesh.file ? "/file" : "");
+    const char *pointer = DRAPE_FORMAT("/cloth/%d/render_mesh", (int)c);
+    const char *place = DRAPE_FORMAT("%s%s", pointer, def->mesh.file ? "/file" : "");
     const drape_mesh_source source = {.pointer = place, .file = def->mesh.file};
     double sum = 0;
     for (int32_t i = 0; i < cloth->mesh.edge_count; i++)
@@ -86,9 +84,9 @@ static drape_status list_cloths(drape_model *model)
         nodes += mesh->node_count;
         triangles += mesh->triangle_count;
         if (nodes > DRAPE_MAX_NODES || triangles > DRAPE_MAX_TRIANGLES)
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
-                                 "the render meshes have more than %d vertices or %d triangles together",
-                                 DRAPE_MAX_NODES, DRAPE_MAX_TRIANGLES);
+            return drape_refuse(model->ctx, "/cloth",
+                                "the render meshes have more than %d vertices or %d triangles together",
+                                DRAPE_MAX_NODES, DRAPE_MAX_TRIANGLES);
     }
     s->node_count = (int32_t)nodes;
     s->triangle_count = (int32_t)triangles;

@@ -3,7 +3,6 @@
 #include "compile/stages.h"
 #include "model/ride.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* The number of the collider that the pin names, which must have the triangle. */
@@ -75,10 +74,9 @@ drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
         for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++, pin++) {
             const drape_pin_def *from = &def->cloths[c].pins[p];
             int32_t collider = -1;
-            char pointer[64];
             if (!from->attach && from->triangle < 0)
                 continue;
-            snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu", c, p);
+            const char *pointer = DRAPE_FORMAT("/cloth/%zu/pins/%zu", c, p);
             status = find_carrier(model, pointer, from, &collider);
             if (!status)
                 status = attach(model, motion, pin, collider, from->triangle);

@@ -96,14 +96,13 @@ static drape_status join(drape_model *model, const char *pointer, const side sid
 {
     const side *a = &sides[0], *b = &sides[1];
     if (a->count != b->count)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "side a has %d nodes and side b has %d: they are joined one by one",
-                             (int)a->count, (int)b->count);
+        return drape_refuse(model->ctx, pointer,
+                            "side a has %d nodes and side b has %d: they are joined one by one",
+                            (int)a->count, (int)b->count);
     for (int32_t i = 0; i < a->count; i++)
         if (a->cloth == b->cloth && a->node[i] == b->node[i])
-            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                                 "pair %d joins node %d of \"%.60s\" to itself", (int)i, (int)a->node[i],
-                                 model->cloths[a->cloth].name);
+            return drape_refuse(model->ctx, pointer, "pair %d joins node %d of \"%.60s\" to itself", (int)i,
+                                (int)a->node[i], model->cloths[a->cloth].name);
     to->pair = drape_arena_take(&model->arena, 2 * (size_t)a->count, sizeof *to->pair);
     if (!to->pair)
         return DRAPE_E_MEMORY;
@@ -121,8 +120,7 @@ static drape_status compile_seam(drape_model *model, size_t i, const drape_seam_
     drape_model_seam *to = &model->seams[i];
     drape_arena scratch = drape_arena_of(model->ctx);
     side sides[2] = {{.model = model, .def = &def->a}, {.model = model, .def = &def->b}};
-    char pointer[48];
-    snprintf(pointer, sizeof pointer, "/seams/%zu", i);
+    const char *pointer = DRAPE_FORMAT("/seams/%zu", i);
     drape_status status =
         drape_compile_name(model, pointer, "seam", "seams", def->name, (int32_t)i, &to->name, sizeof *to);
     if (!status)

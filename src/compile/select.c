@@ -5,7 +5,6 @@
 #include "terms/load.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 /* Takes nodes (row, column) of a grid within the ranges [first, last]. */
@@ -76,16 +75,15 @@ drape_status drape_select_nodes(const drape_selection *s)
     if (given != 1) {
         char wanted[128];
         drape_scene_one_of_text(s->form, wanted, sizeof wanted);
-        return drape_fail_at(s->ctx, DRAPE_E_ARGUMENT, s->pointer, "%s is needed", wanted);
+        return drape_refuse(s->ctx, s->pointer, "%s is needed", wanted);
     }
     if (on_grid && s->mesh->rows == 0)
         return drape_fail_below(
             s->ctx, s->pointer, on_grid,
             "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
     for (size_t i = 0; !status && s->nodes && i < s->node_count; i++) {
-        char key[48];
         const int32_t node = s->nodes[i], count = s->mesh->node_count;
-        snprintf(key, sizeof key, "nodes/%zu", i);
+        const char *key = DRAPE_FORMAT("nodes/%zu", i);
         status = node >= 0 && node < count
                      ? s->take(s->user, key, node)
                      : drape_fail_below(s->ctx, s->pointer, key,

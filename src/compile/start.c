@@ -15,7 +15,6 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define SAME_MESH                                                                                            \
@@ -28,8 +27,7 @@
 static drape_status take_file(drape_model *model, const char *pointer, const char *folder,
                               const drape_start_def *def, const drape_mesh *mesh, double *x)
 {
-    char place[128];
-    snprintf(place, sizeof place, "%s/file", pointer);
+    const char *place = DRAPE_FORMAT("%s/file", pointer);
     const drape_mesh_source source = {.pointer = place, .file = def->file};
     drape_mesh read = {0};
     drape_status status = drape_mesh_read(model->ctx, place, folder, def->file, &read);
@@ -59,12 +57,11 @@ static drape_status take_array(drape_model *model, const char *pointer, const ch
 {
     const size_t count = 3 * (size_t)mesh->node_count;
     if (has_file)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "a file and an array of %s are given; at most one is", what);
+        return drape_refuse(model->ctx, pointer, "a file and an array of %s are given; at most one is", what);
     if (given != count)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "%zu numbers in %s; the cloth has %d nodes, so there are %zu", given, what,
-                             (int)mesh->node_count, count);
+        return drape_refuse(model->ctx, pointer,
+                            "%zu numbers in %s; the cloth has %d nodes, so there are %zu", given, what,
+                            (int)mesh->node_count, count);
     memcpy(to, from, count * sizeof *to);
     return DRAPE_OK;
 }
@@ -119,17 +116,16 @@ static drape_status fold(drape_model *model, const char *pointer, const drape_fo
         vec3_add_scaled(sign * def->radius + further * sine + above * cosine - z, n, at);
     }
     if (!beyond)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "no node of the cloth lies beyond the line, on the side (%g %g %g): nothing is "
-                             "folded",
-                             def->side[0], def->side[1], def->side[2]);
+        return drape_refuse(model->ctx, pointer,
+                            "no node of the cloth lies beyond the line, on the side (%g %g %g): nothing is "
+                            "folded",
+                            def->side[0], def->side[1], def->side[2]);
     return DRAPE_OK;
 }
 
 static drape_status place_nodes(drape_model *model, const char *pointer, const char *folder,
                                 const drape_start_def *def, const drape_mesh *mesh, double *x)
 {
-    char place[128];
     drape_mesh moved = {.node_count = mesh->node_count,
                         .triangle_count = mesh->triangle_count,
                         .triangle = mesh->triangle,
@@ -145,7 +141,7 @@ static drape_status place_nodes(drape_model *model, const char *pointer, const c
     if (!status)
         status = drape_mesh_validate_positions(model->ctx, &source, &moved);
     for (size_t i = 0; !status && i < def->fold_count; i++) {
-        snprintf(place, sizeof place, "%s/folds/%zu", pointer, i);
+        const char *place = DRAPE_FORMAT("%s/folds/%zu", pointer, i);
         status = fold(model, place, &def->folds[i], mesh->node_count, x);
     }
     if (status)
@@ -160,8 +156,7 @@ static drape_status place_nodes(drape_model *model, const char *pointer, const c
 static drape_status read_velocities(drape_model *model, const char *pointer, const char *folder,
                                     const drape_start_def *def, const drape_mesh *mesh, double *v)
 {
-    char place[128];
-    snprintf(place, sizeof place, "%s/velocities", pointer);
+    const char *place = DRAPE_FORMAT("%s/velocities", pointer);
     const drape_mesh_source source = {.pointer = place, .file = def->velocity_file};
     drape_arena scratch = drape_arena_of(model->ctx);
     drape_contents whole = {0};
@@ -208,8 +203,8 @@ static drape_status add_velocities(drape_model *model, const char *pointer, cons
             const double further = own[3 * (size_t)i + (size_t)k] + turning[k];
             if (!(fabs(further) <= DRAPE_MOST))
                 status =
-                    drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                                  "the velocity of node %d is %g m/s; it is in [-1e9, 1e9]", (int)i, further);
+                    drape_refuse(model->ctx, pointer,
+                                 "the velocity of node %d is %g m/s; it is in [-1e9, 1e9]", (int)i, further);
             v[3 * (size_t)i + (size_t)k] += further;
         }
     }
@@ -245,8 +240,7 @@ drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
         const drape_start_def *from = &def->cloths[c].start;
         drape_cloth *cloth = &model->cloths[c];
         double *x = model->start + 3 * (size_t)cloth->first_node;
-        char pointer[64];
-        snprintf(pointer, sizeof pointer, "/cloth/%zu/start", c);
+        const char *pointer = DRAPE_FORMAT("/cloth/%zu/start", c);
         if (from->file)
             cloth->start_file = drape_arena_text(&model->arena, from->file);
         if (from->velocity_file)

@@ -15,11 +15,10 @@ drape_status drape_compile_track(drape_model *model, const char *pointer, const 
                                  size_t key_count, drape_track *track)
 {
     for (size_t k = 0; k < key_count; k++) {
-        char key[40];
         bool finite = isfinite(keys[k].time);
         for (int i = 0; i < 3; i++)
             finite = finite && fabs(keys[k].displacement[i]) <= DRAPE_MOST;
-        snprintf(key, sizeof key, "track/%zu", k);
+        const char *key = DRAPE_FORMAT("track/%zu", k);
         if (!finite)
             return drape_fail_below(model->ctx, pointer, key,
                                     "time and displacement must be finite, the displacement within 1e9 m");

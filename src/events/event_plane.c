@@ -4,8 +4,6 @@
 
 #include "base/elementary.h"
 
-#include <stdio.h>
-
 enum {
     PARAM_NORMAL = DRAPE_EVENT_NODES_COUNT,
     PARAM_OFFSET = PARAM_NORMAL + 1, /* in the list; each number of the normal is a value */
@@ -27,10 +25,9 @@ static drape_status check(drape_context *ctx, const char *pointer, const drape_m
 {
     double *n = event->values + PARAM_NORMAL;
     const double length = drape_hypot(drape_hypot(n[0], n[1]), n[2]);
-    char at[128];
-    snprintf(at, sizeof at, "%s/normal", pointer);
+    const char *at = DRAPE_FORMAT("%s/normal", pointer);
     if (!(length > 0))
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "the normal is [0, 0, 0]; it must have a direction");
+        return drape_refuse(ctx, at, "the normal is [0, 0, 0]; it must have a direction");
     for (int k = 0; k < 3; k++)
         n[k] /= length;
     return drape_event_check_node(ctx, pointer, model, event);

@@ -3,8 +3,6 @@
 
 #include "base/vec3.h"
 
-#include <stdio.h>
-
 enum { LOWEST, HIGHEST, CENTER };
 const char *const drape_event_nodes[] = {"lowest", "highest", "center", NULL};
 
@@ -12,18 +10,16 @@ drape_status drape_event_check_node(drape_context *ctx, const char *pointer, con
                                     drape_model_event *event)
 {
     const double node = event->values[DRAPE_EVENT_NODE];
-    char at[128];
-    snprintf(at, sizeof at, "%s/node", pointer);
+    const char *at = DRAPE_FORMAT("%s/node", pointer);
     if (isnan(node))
         return DRAPE_OK;
     if (event->cloth < 0 && model->cloth_count > 1)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
-                             "a node is a number within one cloth: \"cloth\" must name one of the %d",
-                             (int)model->cloth_count);
+        return drape_refuse(ctx, at, "a node is a number within one cloth: \"cloth\" must name one of the %d",
+                            (int)model->cloth_count);
     const drape_cloth *cloth = &model->cloths[event->cloth < 0 ? 0 : event->cloth];
     if (node >= cloth->mesh.node_count)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "node %.0f is not in the mesh; its nodes are 0 to %d",
-                             node, (int)cloth->mesh.node_count - 1);
+        return drape_refuse(ctx, at, "node %.0f is not in the mesh; its nodes are 0 to %d", node,
+                            (int)cloth->mesh.node_count - 1);
     return DRAPE_OK;
 }
 

@@ -150,10 +150,9 @@ int32_t drape_gltf_index(drape_gltf *g, const char *owner, const json_t *object,
                          int32_t limit)
 {
     const json_t *value = json_object_get(object, key);
-    char where[160];
     if (!g->status)
         g->status = drape_check_cancel_after(g->arena->ctx, 64);
-    snprintf(where, sizeof where, "%s: \"%s\"", owner, key);
+    const char *where = DRAPE_FORMAT("%s: \"%s\"", owner, key);
     return value ? drape_gltf_index_of(g, where, value, limit) : -1;
 }
 
@@ -260,8 +259,8 @@ static drape_status read_sparse(drape_gltf *g, const char *owner, const json_t *
 {
     const json_t *indices = json_object_get(sparse, "indices"), *given = json_object_get(sparse, "count");
     int64_t count, before = -1, stride[2];
-    char part[120], text[40];
-    snprintf(part, sizeof part, "%s, sparse", owner);
+    char text[40];
+    const char *part = DRAPE_FORMAT("%s, sparse", owner);
     if (!take_integer(given, 0, (double)out->count, &count))
         return FAIL(g, "%s: \"count\": %s; it must be an integer from 0 to %" PRId64, part,
                     describe(given, text, sizeof text), out->count);
@@ -313,12 +312,12 @@ drape_gltf_array drape_gltf_read(drape_gltf *g, const char *parent, const json_t
     const char *type = json_string_value(json_object_get(object, "type"));
     const component *c = find_component(object);
     const bool integer = c && c->largest > 0 && !json_is_true(json_object_get(object, "normalized"));
-    char owner[96], text[40];
+    char text[40];
     drape_gltf_array out = {.width = want->width};
     if (g->status || accessor < 0)
         return out;
-    snprintf(owner, sizeof owner, "accessor %d (%s)", (int)accessor,
-             want->purpose ? want->purpose : want->key);
+    const char *owner =
+        DRAPE_FORMAT("accessor %d (%s)", (int)accessor, want->purpose ? want->purpose : want->key);
     if (!type || strcmp(type, drape_gltf_types[want->width]) != 0)
         FAIL(g, "%s: its type is %.20s; %s is needed", owner, type ? type : "missing",
              drape_gltf_types[want->width]);

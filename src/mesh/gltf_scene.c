@@ -233,8 +233,7 @@ static void read_channel(drape_gltf_scene *s, const json_t *animation, const jso
     const json_t *samplers = json_object_get(animation, "samplers");
     const size_t count = json_array_size(samplers);
     drape_gltf_channel *c = &s->channels[s->channel_count];
-    char owner[64];
-    snprintf(owner, sizeof owner, "animation 0, channel %d", number);
+    const char *owner = DRAPE_FORMAT("animation 0, channel %d", number);
     const json_t *target = json_object_get(object, "target");
     c->node = drape_gltf_index(g, owner, target, "node", s->node_count);
     if (c->node < 0)

@@ -1,8 +1,6 @@
 /* grid.c: see grid.h; also generates the grid that a def names. */
 #include "mesh/grid.h"
 
-#include <stdio.h>
-
 #include "base/param.h"
 
 const char *const drape_grid_orientations[] = {
@@ -62,9 +60,8 @@ void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool fli
 drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const drape_entry_def *grid,
                                   drape_mesh *mesh)
 {
-    char place[sizeof ctx->pointer];
     int i;
-    snprintf(place, sizeof place, "%s/grid", pointer);
+    const char *place = DRAPE_FORMAT("%s/grid", pointer);
     drape_status status = drape_registry_choose(ctx, &drape_grid_registry, place, grid->type, &i);
     if (status)
         return status;

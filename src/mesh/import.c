@@ -20,7 +20,7 @@ drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char
             used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", ending);
     }
     if (!import)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
+        return drape_refuse(ctx, pointer, "%s: unknown ending; known are %s", file, known);
 
     const locale_t old = drape_locale_enter();
     const drape_mesh_source source = {.pointer = pointer, .file = file};
@@ -37,7 +37,6 @@ drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char
 drape_status drape_mesh_from_file(drape_context *ctx, const char *pointer, const char *folder,
                                   const char *file, drape_mesh *mesh)
 {
-    char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s/file", pointer);
+    const char *place = DRAPE_FORMAT("%s/file", pointer);
     return drape_mesh_read(ctx, place, folder, file, mesh);
 }

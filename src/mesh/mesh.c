@@ -19,7 +19,7 @@ drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source
     drape_locale_leave(old);
 
     if (!source->file)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, source->pointer, "%s", text);
+        return drape_refuse(ctx, source->pointer, "%s", text);
     if (line == 0)
         return drape_fail_at(ctx, DRAPE_E_PARSE, source->pointer, "%s: %s", source->file, text);
     return drape_fail_at(ctx, DRAPE_E_PARSE, source->pointer, "%s:%lld: %s", source->file, (long long)line,
@@ -105,10 +105,9 @@ drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const dra
     const bool arrays = def->positions || def->triangles;
     const int count = (def->grid.type != NULL) + (def->file != NULL) + arrays;
     if (count != 1)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                             "%d sources%s%s%s; a mesh has exactly one of grid, file, positions", count,
-                             def->grid.type ? ", grid" : "", def->file ? ", file" : "",
-                             arrays ? ", positions" : "");
+        return drape_refuse(ctx, pointer, "%d sources%s%s%s; a mesh has exactly one of grid, file, positions",
+                            count, def->grid.type ? ", grid" : "", def->file ? ", file" : "",
+                            arrays ? ", positions" : "");
     drape_status status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
     if (!status)
         status = def->grid.type ? drape_mesh_from_grid(ctx, pointer, &def->grid, mesh)

@@ -43,8 +43,7 @@ double drape_npy_array_at(const drape_npy_array *array, size_t index)
 /* The text of a key's value in the dict: what follows "'key':". NULL: there is no such key. */
 static const char *value_of(const char *dict, const char *key)
 {
-    char word[32];
-    snprintf(word, sizeof word, "'%s':", key);
+    const char *word = DRAPE_FORMAT("'%s':", key);
     const char *at = strstr(dict, word);
     return at ? at + strlen(word) + strspn(at + strlen(word), " ") : NULL;
 }

@@ -26,7 +26,7 @@ static const drape_sequence_ops *find_format(drape_context *ctx, const char *poi
             if (used < sizeof known)
                 used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", ending);
         }
-    drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
+    drape_refuse(ctx, pointer, "%s: unknown ending; known are %s", file, known);
     return NULL;
 }
 
@@ -67,8 +67,7 @@ static drape_status set_times(const drape_sequence_source *source, const char *p
                               const drape_sequence_def *def, drape_sequence *out)
 {
     drape_context *ctx = source->ctx;
-    char at[sizeof ctx->pointer];
-    snprintf(at, sizeof at, "%s/times", pointer);
+    const char *at = DRAPE_FORMAT("%s/times", pointer);
     const drape_mesh_source file = {.pointer = at, .file = def->times};
     drape_contents whole = {0};
     drape_npy_array array;
@@ -111,9 +110,8 @@ drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const 
                                  const drape_sequence_def *def, drape_mesh *mesh, drape_sequence *out)
 {
     drape_context *ctx = arena->ctx;
-    char at_file[sizeof ctx->pointer], at_mesh[sizeof ctx->pointer];
-    snprintf(at_file, sizeof at_file, "%s/file", pointer);
-    snprintf(at_mesh, sizeof at_mesh, "%s/mesh", pointer);
+    const char *at_file = DRAPE_FORMAT("%s/file", pointer);
+    const char *at_mesh = DRAPE_FORMAT("%s/mesh", pointer);
     const drape_sequence_ops *format = find_format(ctx, at_file, def->file);
     drape_arena scratch = drape_arena_of(ctx);
     drape_sequence_source source = {.ctx = ctx,

@@ -59,8 +59,7 @@ static void read_skin(reader *r, int32_t index)
     drape_gltf *g = &r->gltf;
     const json_t *object = drape_gltf_item(g, "skins", index), *joints = json_object_get(object, "joints");
     skin *s = &r->skins[index];
-    char owner[48];
-    snprintf(owner, sizeof owner, "skin %d", (int)index);
+    const char *owner = DRAPE_FORMAT("skin %d", (int)index);
     s->count = (int32_t)json_array_size(joints);
     if (s->count == 0)
         FAIL(r, "%s has no joints", owner);
@@ -190,8 +189,7 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
     drape_gltf *g = &r->gltf;
     const json_t *attributes = json_object_get(primitive, "attributes");
     part p = {.node = node, .first = (int32_t)r->point_count, .triangle = r->triangle_count};
-    char owner[80];
-    snprintf(owner, sizeof owner, "mesh %d, primitive %d", (int)mesh, number);
+    const char *owner = DRAPE_FORMAT("mesh %d, primitive %d", (int)mesh, number);
     const int32_t mode = drape_gltf_index(g, owner, primitive, "mode", MODES);
     if (mode > DRAPE_GLTF_TRIANGLES)
         FAIL(r, "%s: its mode is %d; triangles, 4, are read, and no strips and fans", owner, (int)mode);
@@ -346,8 +344,7 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
             for (int32_t i = 0; i < r->parts[k].count; i++)
                 place_point(r, &r->parts[k], (size_t)i, x + 3 * (size_t)(r->parts[k].first + i));
         const drape_mesh frame = {.node_count = mesh->node_count, .x = x};
-        char text[32];
-        snprintf(text, sizeof text, "frame %d: ", (int)f);
+        const char *text = DRAPE_FORMAT("frame %d: ", (int)f);
         const drape_mesh_source source = {
             .pointer = r->source->file.pointer, .file = r->source->file.file, .part = text};
         if (!status)

@@ -166,11 +166,10 @@ static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
 {
     size_t consumed = (size_t)error->position;
     bool at_end = strstr(error->text, "near end of file") != NULL;
-    char what[80];
     switch (json_error_code(error)) {
     case json_error_invalid_utf8:
-        snprintf(what, sizeof what, "byte 0x%02x is not UTF-8", (unsigned char)scene->text[consumed]);
-        return parse_fault(scene, consumed, what);
+        return parse_fault(scene, consumed,
+                           DRAPE_FORMAT("byte 0x%02x is not UTF-8", (unsigned char)scene->text[consumed]));
     case json_error_null_character:
         return parse_fault(scene, drape_text_token(scene->text, consumed, false), "\\u0000 is not allowed");
     case json_error_stack_overflow:

@@ -19,7 +19,6 @@
 #include "model/scene_json.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/param.h"
@@ -95,8 +94,7 @@ static drape_status check_object(drape_context *ctx, const object *o, json_t *va
         if (!member) {
             char takes[100];
             drape_param_takes_text(param, takes, sizeof takes);
-            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text, "\"%s\" is missing from a CS184 scene: %s",
-                                 param->name, takes);
+            return drape_refuse(ctx, at.text, "\"%s\" is missing from a CS184 scene: %s", param->name, takes);
         }
         drape_status status = drape_json_check(ctx, &at, param, member);
         if (status)
@@ -121,10 +119,10 @@ static drape_status check_keys(drape_context *ctx, json_t *root)
             continue;
         const char *meant = drape_did_you_mean(name, theirs, 3);
         drape_pointer_push(&at, name);
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text,
-                             "unknown key \"%.60s\" of a CS184 scene%s%s%s; one of ours has \"drape\": 1",
-                             name, meant ? "; did you mean \"" : ", which has cloth, sphere, plane",
-                             meant ? meant : "", meant ? "\"?" : "");
+        return drape_refuse(ctx, at.text,
+                            "unknown key \"%.60s\" of a CS184 scene%s%s%s; one of ours has \"drape\": 1",
+                            name, meant ? "; did you mean \"" : ", which has cloth, sphere, plane",
+                            meant ? meant : "", meant ? "\"?" : "");
     }
     return DRAPE_OK;
 }
@@ -155,8 +153,7 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
             const double number = json_number_value(value);
             if (json_is_number(value) && number >= 0 && number < points[k] && number == floor(number))
                 continue;
-            char expected[60];
-            snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[k] - 1);
+            const char *expected = DRAPE_FORMAT("an integer from 0 to %.0f", points[k] - 1);
             drape_pointer_push_index(&at, k);
             return drape_json_refuse(ctx, &at, value, k ? "y of a pin" : "x of a pin", expected);
         }
@@ -179,9 +176,7 @@ static drape_status check(drape_context *ctx, json_t *root)
     bool has_direction = !normal;
     for (size_t i = 0; i < json_array_size(normal); i++)
         has_direction = has_direction || json_number_value(json_array_get(normal, i)) != 0;
-    return status || has_direction
-               ? status
-               : drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "0 0 0 has no direction");
+    return status || has_direction ? status : drape_refuse(ctx, "/plane/normal", "0 0 0 has no direction");
 }
 
 /* ---- Our format. NULL means out of memory; jansson's functions accept it as an argument. ---- */

@@ -68,8 +68,7 @@ drape_status drape_json_refuse(drape_context *ctx, const drape_pointer *at, json
 {
     char given[80];
     drape_json_describe(value, given, sizeof given);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at->text, "%s is not allowed; %s is %s", given, what,
-                         expected);
+    return drape_refuse(ctx, at->text, "%s is not allowed; %s is %s", given, what, expected);
 }
 
 static drape_status refuse(reader *r, const drape_scene_key *key, json_t *value)
@@ -91,8 +90,8 @@ static drape_status missing(reader *r, const drape_scene_key *key)
     char expected[MAX_TAKES];
     drape_scene_takes_text(key, expected, sizeof expected);
     drape_pointer_push(&r->at, key->param.name);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "\"%s\" is missing: %s; %s", key->param.name,
-                         key->param.help, expected);
+    return drape_refuse(r->ctx, r->at.text, "\"%s\" is missing: %s; %s", key->param.name, key->param.help,
+                        expected);
 }
 
 /* "a, b, c" */
@@ -116,12 +115,12 @@ static drape_status unknown_key(reader *r, const drape_scene_object *object, con
     const char *meant = drape_did_you_mean(name, known, count);
     drape_pointer_push(&r->at, name);
     if (meant)
-        return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text,
-                             "unknown key %s; did you mean \"%s\"? Known: %s", given, meant, list);
+        return drape_refuse(r->ctx, r->at.text, "unknown key %s; did you mean \"%s\"? Known: %s", given,
+                            meant, list);
     if (object->open_with)
-        return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s without \"%s\"; known: %s",
-                             given, object->open_with, list);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s; known: %s", given, list);
+        return drape_refuse(r->ctx, r->at.text, "unknown key %s without \"%s\"; known: %s", given,
+                            object->open_with, list);
+    return drape_refuse(r->ctx, r->at.text, "unknown key %s; known: %s", given, list);
 }
 
 /* ---- Values ---- */
@@ -392,7 +391,7 @@ static drape_status check_one_of(reader *r, const drape_scene_object *object, js
     drape_scene_one_of_text(object, wanted, sizeof wanted);
     if (given_count)
         list_names(given, given_count, found, sizeof found);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "%s is needed; given: %s", wanted, found);
+    return drape_refuse(r->ctx, r->at.text, "%s is needed; given: %s", wanted, found);
 }
 
 /* Unknown keys are reported first: a missing key may be there under a misspelled name. */
@@ -469,8 +468,7 @@ static drape_status check_names(reader *r, const drape_scene_def *def)
     json_t *names = json_object(); /* used as a set */
     drape_status status = names ? DRAPE_OK : drape_fail_memory(r->ctx, 1);
     for (size_t i = 0; !status && i < def->cloth_count; i++) {
-        char own[40];
-        snprintf(own, sizeof own, "cloth%zu", i);
+        const char *own = DRAPE_FORMAT("cloth%zu", i);
         const char *name = def->cloths[i].name ? def->cloths[i].name : own;
         if (json_object_get(names, name)) {
             char given[80];
@@ -478,8 +476,7 @@ static drape_status check_names(reader *r, const drape_scene_def *def)
             drape_pointer_push(&r->at, "cloth");
             drape_pointer_push_index(&r->at, i);
             drape_pointer_push(&r->at, "name");
-            status =
-                drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "%s is the name of another cloth", given);
+            status = drape_refuse(r->ctx, r->at.text, "%s is the name of another cloth", given);
         } else if (json_object_set_new(names, name, json_true())) {
             status = drape_fail_memory(r->ctx, strlen(name));
         }

@@ -30,8 +30,7 @@ void drape_pointer_push(drape_pointer *pointer, const char *key)
 
 void drape_pointer_push_index(drape_pointer *pointer, size_t index)
 {
-    char text[32];
-    snprintf(text, sizeof text, "/%zu", index);
+    const char *text = DRAPE_FORMAT("/%zu", index);
     push_text(pointer, text);
 }
 

@@ -5,12 +5,9 @@
 #ifndef DRAPE_MODEL_SCENE_TEXT_H
 #define DRAPE_MODEL_SCENE_TEXT_H
 
-#include <stdbool.h>
-#include <stddef.h>
+#include "base/context.h"
 
 /* ---- JSON pointers (RFC 6901) ------------------------------------------------------------------------ */
-
-#define DRAPE_POINTER_SIZE 256 /* including its zero byte: as much as a context keeps */
 
 /* A pointer that grows and shrinks during the walk through a scene. Keys that do not fit are cut off. */
 typedef struct drape_pointer {
