@@ -1,7 +1,7 @@
 /* sum.c: see sum.h. */
 #include "assemble/sum.h"
 
-#include "assemble/parts.h"
+#include "assemble/term_parts.h"
 
 #include <string.h>
 

@@ -49,8 +49,8 @@ char *drape_copy_text(drape_context *ctx, const char *text);
 void drape_make_printable(char *text);
 
 /* Set the message and return status. drape_fail_at also names the place by its JSON pointer: message
- * "pointer: text". drape_refuse does that with DRAPE_E_ARGUMENT, drape_fail_below likewise at a key of the object
- * at `pointer`: "/seams/0/name" for "name". */
+ * "pointer: text". drape_refuse does that with DRAPE_E_ARGUMENT, drape_fail_below likewise at a key of the
+ * object at `pointer`: "/seams/0/name" for "name". */
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
@@ -58,8 +58,8 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
 #define drape_fail_below(ctx, pointer, key, ...)                                                             \
     drape_refuse(ctx, DRAPE_FORMAT("%s/%s", pointer, key), __VA_ARGS__)
 
-/* A short text, such as a JSON pointer, that is made in place: valid until the end of the block, and cut off if it
- * is longer. */
+/* A short text, such as a JSON pointer, that is made in place: valid until the end of the block, and cut off
+ * if it is longer. */
 #define DRAPE_FORMAT(...) drape_format((char[DRAPE_POINTER_SIZE]){0}, __VA_ARGS__)
 const char *drape_format(char text[DRAPE_POINTER_SIZE], const char *format, ...) DRAPE_PRINTF(2, 3);
 

@@ -2,7 +2,7 @@
 #include "compile/select.h"
 
 #include "model/scene.h"
-#include "terms/load.h"
+#include "terms/load_edges.h"
 
 #include <math.h>
 #include <string.h>

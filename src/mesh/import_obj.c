@@ -17,7 +17,7 @@
 #include <string.h>
 
 #include "mesh/mesh.h"
-#include "mesh/text.h"
+#include "mesh/words.h"
 
 #define FAIL(reader, ...) drape_mesh_fail((reader)->ctx, (reader)->source, (reader)->text.line, __VA_ARGS__)
 

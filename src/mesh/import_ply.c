@@ -14,7 +14,7 @@
 #include <string.h>
 
 #include "mesh/mesh.h"
-#include "mesh/text.h"
+#include "mesh/words.h"
 
 #define MAX_ELEMENTS   32
 #define MAX_PROPERTIES 256

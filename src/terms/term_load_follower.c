@@ -9,7 +9,7 @@
  * is counted with that of drag. load.pressure has the same forces on nodes inside the cloth, and a potential.
  */
 #include "base/vec3.h"
-#include "terms/load.h"
+#include "terms/load_edges.h"
 #include "terms/terms.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* load.line: a dead force per length on boundary edges: E = -f . (x0 + x1) L/2 with the rest length L.
  * Linear: it has no Hessian. */
-#include "terms/load.h"
+#include "terms/load_edges.h"
 #include "terms/terms.h"
 
 enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_HISTORY, LIST_RAMP, LIST_COUNT };

@@ -17,7 +17,7 @@
 #include "base/elementary.h"
 #include "base/vec3.h"
 #include "terms/dihedral.h"
-#include "terms/load.h"
+#include "terms/load_edges.h"
 #include "terms/terms.h"
 
 #include <math.h>

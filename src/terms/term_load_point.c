@@ -1,5 +1,5 @@
 /* load.point: a dead force on each of some nodes: E = -f . x. Linear: it has no Hessian. */
-#include "terms/load.h"
+#include "terms/load_edges.h"
 #include "terms/terms.h"
 
 enum { LIST_NODE, LIST_BOX_MIN, LIST_BOX_MAX, LIST_FORCE, LIST_HISTORY, LIST_RAMP, LIST_COUNT };

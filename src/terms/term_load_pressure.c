@@ -9,7 +9,7 @@
  * those on the cloth closed by that cone.
  */
 #include "base/vec3.h"
-#include "terms/load.h"
+#include "terms/load_edges.h"
 #include "terms/terms.h"
 
 #include <math.h>

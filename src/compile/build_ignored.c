@@ -1,4 +1,4 @@
-/* ignored.c: which cloths pass through which colliders and cloths. */
+/* build_ignored.c: which cloths pass through which colliders and cloths. */
 #include "compile/stages.h"
 
 #include <string.h>

@@ -1,4 +1,4 @@
-/* seams.c: which nodes the seams join. Their elements are built with those of the other terms. */
+/* build_seams.c: which nodes the seams join. Their elements are built with those of the other terms. */
 #include "compile/select.h"
 #include "compile/stages.h"
 

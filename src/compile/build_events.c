@@ -1,4 +1,4 @@
-/* events.c: events by name, with their parameters, cloths and pins. */
+/* build_events.c: events by name, with their parameters, cloths and pins. */
 #include "events/events.h"
 #include "compile/compile.h"
 #include "compile/stages.h"

@@ -1,5 +1,5 @@
-/* pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are eliminated from
- * the system. */
+/* build_pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are
+ * eliminated from the system. */
 #include "base/vec3.h"
 #include "compile/select.h"
 #include "compile/stages.h"

@@ -1,12 +1,13 @@
 /*
- * parts.h: measures that are linear combinations of parts, q_e = sum_p c_ep s_p. Each part is evaluated once:
+ * term_parts.h: measures that are linear combinations of parts, q_e = sum_p c_ep s_p. Each part is
+ * evaluated once:
  *     g = sum_p (sum_e c_ep f_e) ds_p
  *     H = sum_p (sum_e c_ep f_e) dds_p + sum_e w_e dq_e dq_e',  dq_e = sum_p c_ep ds_p
  * with the forces f_e on the measures and their weights w_e of block.h. The first sum of H is over parts of
  * few nodes, the second over patches: elements with the same nodes, whose products are added together.
  */
-#ifndef DRAPE_ASSEMBLE_PARTS_H
-#define DRAPE_ASSEMBLE_PARTS_H
+#ifndef DRAPE_ASSEMBLE_TERM_PARTS_H
+#define DRAPE_ASSEMBLE_TERM_PARTS_H
 
 #include "assemble/block.h"
 

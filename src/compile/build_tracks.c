@@ -1,4 +1,4 @@
-/* tracks.c: checks and copies the track of a pin or a collider, and the rotation of a collider. */
+/* build_tracks.c: checks and copies the track of a pin or a collider, and the rotation of a collider. */
 #include "compile/stages.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
-/* load.c: see load.h. */
-#include "terms/load.h"
+/* load_edges.c: see load_edges.h. */
+#include "terms/load_edges.h"
 
 #include "terms/terms.h"
 

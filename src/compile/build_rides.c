@@ -1,4 +1,4 @@
-/* rides.c: pins that colliders carry: the point of its collider at which each begins. */
+/* build_rides.c: pins that colliders carry: the point of its collider at which each begins. */
 #include "colliders/deformed.h"
 #include "compile/stages.h"
 #include "model/ride.h"

@@ -1,5 +1,5 @@
-/* histories.c: the histories of a scene, and which of them a term has: by its parameter "history", or by
- * "ramp", which stands for a cubic from 0 at t = 0 to 1. */
+/* build_histories.c: the histories of a scene, and which of them a term has: by its parameter "history", or
+ * by "ramp", which stands for a cubic from 0 at t = 0 to 1. */
 #include "compile/stages.h"
 #include "model/history.h"
 

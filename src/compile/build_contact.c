@@ -1,4 +1,4 @@
-/* contact.c: the parameters of contact, from the scene's "contact", "self_contact" and "untangle", with
+/* build_contact.c: the parameters of contact, from the scene's "contact", "self_contact" and "untangle", with
  * defaults derived from the scales of the scene. */
 #include "base/elementary.h"
 #include "base/vec3.h"

@@ -1,6 +1,6 @@
 /*
- * material.c: derives membrane stiffness E h, flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped masses
- * from Young's modulus, Poisson's ratio, thickness and a density.
+ * build_material.c: derives membrane stiffness E h, flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped
+ * masses from Young's modulus, Poisson's ratio, thickness and a density.
  */
 #include "compile/fabrics.h"
 #include "compile/stages.h"

@@ -1,6 +1,6 @@
-/* text.h: reads words and numbers from a text line by line and keeps the line number. */
-#ifndef DRAPE_MESH_TEXT_H
-#define DRAPE_MESH_TEXT_H
+/* words.h: reads words and numbers from a text line by line and keeps the line number. */
+#ifndef DRAPE_MESH_WORDS_H
+#define DRAPE_MESH_WORDS_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
-/* load.h: the boundary edges that a load acts on. */
-#ifndef DRAPE_TERMS_LOAD_H
-#define DRAPE_TERMS_LOAD_H
+/* load_edges.h: the boundary edges that a load acts on. */
+#ifndef DRAPE_TERMS_LOAD_EDGES_H
+#define DRAPE_TERMS_LOAD_EDGES_H
 
 #include "terms/terms.h"
 

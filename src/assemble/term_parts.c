@@ -1,5 +1,5 @@
-/* parts.c: see parts.h. */
-#include "assemble/parts.h"
+/* term_parts.c: see term_parts.h. */
+#include "assemble/term_parts.h"
 
 #include "base/lanes.h"
 #include "base/vec3.h"

@@ -1,5 +1,5 @@
 /*
- * start.c: the shape in which a cloth starts, if it is not at rest, and its initial velocities.
+ * build_start.c: the shape in which a cloth starts, if it is not at rest, and its initial velocities.
  *
  * A fold about the line through p with the unit direction e turns what is beyond it, in the direction d
  * across e. With n = e x d, a node has the coordinates s along d and z along n, relative to p. A sheet at z

@@ -1,5 +1,5 @@
-/* periodic.c: which nodes of a cloth are images of each other, where they start, and that the rest of the
- * scene leaves them so. See model/periodic.h. */
+/* build_periodic.c: which nodes of a cloth are images of each other, where they start, and that the rest of
+ * the scene leaves them so. See model/periodic.h. */
 #include "model/periodic.h"
 
 #include "base/vec3.h"

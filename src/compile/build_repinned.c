@@ -1,6 +1,6 @@
-/* repin.c: a model with other nodes pinned, or other masses. What depends on which nodes are free is computed
- * anew: their numbers, the pattern of the matrix, and the places of elements in it; and what depends on
- * masses: weights and the stiffness of contact. Everything else is shared. */
+/* build_repinned.c: a model with other nodes pinned, or other masses. What depends on which nodes are free
+ * is computed anew: their numbers, the pattern of the matrix, and the places of elements in it; and what
+ * depends on masses: weights and the stiffness of contact. Everything else is shared. */
 #include "compile/compile.h"
 #include "compile/stages.h"
 #include "model/periodic.h"

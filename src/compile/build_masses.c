@@ -1,4 +1,4 @@
-/* masses.c: nodes with masses of their own, beside or in place of what the material gives them. */
+/* build_masses.c: nodes with masses of their own, beside or in place of what the material gives them. */
 #include "compile/select.h"
 #include "compile/stages.h"
 

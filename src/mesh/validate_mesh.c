@@ -1,5 +1,5 @@
-/* validate.c: refuses meshes that are not a sheet of cloth, and names the place. Such meshes would divide by
- * zero in a term, make the mass matrix singular, or connect parts that share no edge. */
+/* validate_mesh.c: refuses meshes that are not a sheet of cloth, and names the place. Such meshes would
+ * divide by zero in a term, make the mass matrix singular, or connect parts that share no edge. */
 #include <math.h>
 
 #include "base/vec3.h"

@@ -1,4 +1,4 @@
-/* colliders.c: colliders by name, with their parameters, shapes, tracks and rotations. */
+/* build_colliders.c: colliders by name, with their parameters, shapes, tracks and rotations. */
 #include "colliders/colliders.h"
 #include "base/def.h"
 #include "compile/stages.h"

@@ -1,5 +1,5 @@
-/* render_mesh.c: reads the render meshes of cloths, binds their vertices to the simulated triangles at
- * rest, and gathers what frames show. */
+/* build_render_meshes.c: reads the render meshes of cloths, binds their vertices to the simulated triangles
+ * at rest, and gathers what frames show. */
 #include "compile/stages.h"
 #include "geometry/embed.h"
 

@@ -1,5 +1,5 @@
-/* text.c: see text.h. The byte after the text is 0, so looking one character ahead is always safe. */
-#include "mesh/text.h"
+/* words.c: see words.h. The byte after the text is 0, so looking one character ahead is always safe. */
+#include "mesh/words.h"
 
 #include <math.h>
 #include <stdlib.h>
