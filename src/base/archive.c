@@ -12,7 +12,7 @@
 #define MAGIC_SIZE 8
 #define HEAD       (MAGIC_SIZE + sizeof(uint32_t))
 #define TAIL       (2 * sizeof(uint64_t))
-#define MARK_ROOM  32
+#define MARK_SIZE  32
 
 drape_status drape_archive_fail(drape_archive *a, drape_status status, const char *format, ...)
 {
@@ -49,7 +49,7 @@ static void put(drape_archive *a, const void *data, size_t size)
     const unsigned char *from = data;
     a->size += size;
     while (size > 0) {
-        size_t room = DRAPE_ARCHIVE_BUFFER - a->used, part = size < room ? size : room;
+        size_t space = DRAPE_ARCHIVE_BUFFER - a->used, part = size < space ? size : space;
         memcpy(a->buffer + a->used, from, part);
         a->used += part;
         from += part;
@@ -201,7 +201,7 @@ void drape_archive_text(drape_archive *a, char *text, size_t size)
 
 void drape_archive_mark(drape_archive *a, const char *name)
 {
-    char found[MARK_ROOM];
+    char found[MARK_SIZE];
     snprintf(found, sizeof found, "%s", name);
     drape_archive_text(a, found, sizeof found);
     if (!a->status && strcmp(found, name) != 0)

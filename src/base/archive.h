@@ -6,10 +6,10 @@
  *     the parts                        in the byte order of the machine, which the reader must share
  *     length of all before, checksum   16 bytes
  *
- * The checksum is that of base/checksum.h, of all before it, which bytes can be added to in any order: where
- * ranks share a model, each of them writes its own rows of an array. A change within one of its words of 8
- * bytes, so of any one byte, is always detected, and any other, such as words that change places, but with a
- * probability of 2^-64; the length detects a cut. Both are compared before any part is read; readers
+ * The checksum (base/checksum.h) is of all bytes before it, and can be computed in any order: where ranks
+ * share a model, each writes its own rows of an array. It always detects a change within one word of 8 bytes,
+ * and misses any other change, such as words that change places, with a probability of 2^-64; the length
+ * detects a cut. Both are compared before any part is read; readers
  * therefore need not guard against damage, only against archives of other objects. After a failure nothing
  * more is read or written and the first status is kept, so callers need to check the status only at the end.
  * Nothing is allocated.

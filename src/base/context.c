@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* The shortest def of an older host. */
 #define MIN_SIZE        offsetof(drape_context_def, log)
@@ -196,6 +197,18 @@ const char *drape_format(char text[DRAPE_POINTER_SIZE], const char *format, ...)
     vsnprintf(text, DRAPE_POINTER_SIZE, format, args);
     va_end(args);
     return text;
+}
+
+void drape_list_add(char *list, size_t size, const char *name)
+{
+    const size_t used = strlen(list);
+    snprintf(list + used, size - used, "%s%s", used ? ", " : "", name);
+}
+
+bool drape_ends_in(const char *file, const char *ending)
+{
+    const size_t length = strlen(file), size = strlen(ending);
+    return length > size && strcasecmp(file + length - size, ending) == 0;
 }
 
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,

@@ -58,10 +58,25 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
 #define drape_fail_below(ctx, pointer, key, ...)                                                             \
     drape_refuse(ctx, DRAPE_FORMAT("%s/%s", pointer, key), __VA_ARGS__)
 
+/* Returns from the calling function with the status of a call that failed. Not for functions that must free
+ * something first. */
+#define DRAPE_TRY(call)                                                                                      \
+    do {                                                                                                     \
+        const drape_status status_of_call = (call);                                                          \
+        if (status_of_call)                                                                                  \
+            return status_of_call;                                                                           \
+    } while (0)
+
 /* A short text, such as a JSON pointer, that is made in place: valid until the end of the block, and cut off
  * if it is longer. */
 #define DRAPE_FORMAT(...) drape_format((char[DRAPE_POINTER_SIZE]){0}, __VA_ARGS__)
 const char *drape_format(char text[DRAPE_POINTER_SIZE], const char *format, ...) DRAPE_PRINTF(2, 3);
+
+/* Appends a name to a list, "a, b, c", of which it cuts off what is longer than size - 1. */
+void drape_list_add(char *list, size_t size, const char *name);
+
+/* Whether the name of a file is longer than this ending and ends in it, in any case. */
+bool drape_ends_in(const char *file, const char *ending);
 
 /* For the status of a user-defined function, before whose call the message was cleared: if it failed without
  * setting a message, sets this one. Returns status. */

@@ -13,10 +13,10 @@ typedef struct source {
 
 /* jansson asks for the next character after it has stored one, and before it converts a number, which clears
  * errno: with one character a call, no failed allocation is missed. */
-static size_t next(void *buffer, size_t room, void *user)
+static size_t next(void *buffer, size_t space, void *user)
 {
     source *s = user;
-    (void)room;
+    (void)space;
     s->failed |= drape_memory_ran_out();
     if (s->failed || s->left == 0)
         return 0;

@@ -11,7 +11,6 @@
 #define MAX_WORD   63
 #define MIN_PART   3    /* letters: shorter words are near to a part of too many names */
 #define SHOWN_SIZE 24   /* bytes of a number with 10 digits */
-#define RANGE_SIZE 1024 /* bytes of a range as text: lists of choices are long */
 #define POINT_MIN  1e-9 /* of the second numbers of points */
 #define POINT_MAX  1e15
 
@@ -153,15 +152,14 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
     const bool points = param->kind == DRAPE_PARAM_POINTS;
     const char *numbers = param->numbers ? param->numbers : points ? "[x, y]" : "[x, y, z]";
     char several[128] = "";
-    size_t used;
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
         snprintf(text, size, "true or false");
         return;
     case DRAPE_PARAM_CHOICE:
-        used = (size_t)snprintf(text, size, "one of: ");
-        for (int i = 0; param->choices[i] && used < size; i++)
-            used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
+        snprintf(text, size, "one of: %s", param->choices[0]);
+        for (int i = 1; param->choices[i]; i++)
+            drape_list_add(text, size, param->choices[i]);
         return;
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "a non-empty string");
@@ -184,7 +182,7 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
              SHOWN(param->max), param->open_max ? ')' : ']', *unit && !points ? " " : "", points ? "" : unit);
 }
 
-void drape_param_takes_text(const drape_param *param, char *text, size_t size)
+const char *drape_param_takes_text(const drape_param *param, char *text, size_t size)
 {
     const char *kind = param->kind == DRAPE_PARAM_INTEGER  ? "an integer in "
                        : param->kind == DRAPE_PARAM_NUMBER ? "a number in "
@@ -193,16 +191,27 @@ void drape_param_takes_text(const drape_param *param, char *text, size_t size)
     snprintf(text, size, "%s", kind);
     if (used < size)
         drape_param_range_text(param, text + used, size - used);
+    return text;
 }
 
-void drape_number_text(double number, char *text, size_t size)
+const char *drape_number_text(double number, char text[DRAPE_NUMBER_SIZE])
 {
     for (int digits = 10; digits <= 17; digits++) {
-        snprintf(text, size, "%.*g", digits, number);
+        snprintf(text, DRAPE_NUMBER_SIZE, "%.*g", digits, number);
         if (strtod(text, NULL) == number)
-            return;
+            break;
     }
+    return text;
 }
+
+/* The same with the exponent as people write it. */
+static const char *given_text(double number, char text[DRAPE_NUMBER_SIZE])
+{
+    drape_number_text(number, text);
+    trim_exponent(text);
+    return text;
+}
+#define GIVEN(number) given_text(number, (char[DRAPE_NUMBER_SIZE]){0})
 
 void drape_param_value_text(const drape_param *param, const double *value, char *text, size_t size)
 {
@@ -236,18 +245,14 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
 drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const drape_param *param,
                                 const char *given)
 {
-    char takes[RANGE_SIZE];
-    drape_param_takes_text(param, takes, sizeof takes);
-    return drape_refuse(ctx, pointer, "%.100s is not allowed; %s is %s", given, param->name, takes);
+    return drape_refuse(ctx, pointer, "%.100s is not allowed; %s is %s", given, param->name,
+                        DRAPE_PARAM_TAKES(param));
 }
 
 static drape_status refuse_number(drape_context *ctx, const char *pointer, const drape_param *param,
                                   double number)
 {
-    char given[40];
-    drape_number_text(number, given, sizeof given);
-    trim_exponent(given);
-    return drape_param_refuse(ctx, pointer, param, given);
+    return drape_param_refuse(ctx, pointer, param, GIVEN(number));
 }
 
 static bool in_range(const drape_param *param, double number)
@@ -294,17 +299,13 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
 static drape_status refuse_point(drape_context *ctx, const char *pointer, const drape_param *param, size_t i,
                                  int k, double number, double before)
 {
-    char given[40], least[40];
     const char *at = DRAPE_FORMAT("%.250s/%zu/%d", pointer, i, k);
-    drape_number_text(number, given, sizeof given);
-    drape_number_text(before, least, sizeof least);
-    trim_exponent(given), trim_exponent(least);
     return drape_refuse(
         ctx, at,
         "%s is not allowed; the %s number of a point of %s is above that of the point before, "
         "%s, and in [%s, %s]",
-        given, k == 0 ? "first" : "second", param->name, least, SHOWN(k == 0 ? param->min : POINT_MIN),
-        SHOWN(k == 0 ? param->max : POINT_MAX));
+        GIVEN(number), k == 0 ? "first" : "second", param->name, GIVEN(before),
+        SHOWN(k == 0 ? param->min : POINT_MIN), SHOWN(k == 0 ? param->max : POINT_MAX));
 }
 
 /* The bounds keep slopes, and products of two of them, far from overflow and underflow. */
@@ -358,7 +359,6 @@ static drape_status text_value(drape_context *ctx, const char *pointer, const dr
             break;
         }
     const bool yes = strcmp(text, "true") == 0, boolean = yes || strcmp(text, "false") == 0;
-    char takes[RANGE_SIZE];
     size_t count = 0;
     for (; param->kind == DRAPE_PARAM_CHOICE && param->choices[count]; count++)
         if (strcmp(param->choices[count], text) == 0) {
@@ -372,10 +372,9 @@ static drape_status text_value(drape_context *ctx, const char *pointer, const dr
     const char *given = DRAPE_FORMAT(boolean ? "%.60s" : "\"%.60s\"", text);
     if (count == 0)
         return drape_param_refuse(ctx, pointer, param, given);
-    drape_param_takes_text(param, takes, sizeof takes);
     const char *meant = drape_did_you_mean(text, param->choices, count);
-    return drape_refuse(ctx, pointer, "%s is not allowed; %s is %s%s%s%s", given, param->name, takes,
-                        DRAPE_DID_YOU_MEAN(meant));
+    return drape_refuse(ctx, pointer, "%s is not allowed; %s is %s%s%s%s", given, param->name,
+                        DRAPE_PARAM_TAKES(param), DRAPE_DID_YOU_MEAN(meant));
 }
 
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -391,10 +390,9 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
 drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const char *name,
                                  const char *const *known, size_t count)
 {
-    char list[RANGE_SIZE] = "";
-    size_t used = 0;
-    for (size_t i = 0; i < count && used < sizeof list; i++)
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", known[i]);
+    char list[DRAPE_RANGE_SIZE] = "";
+    for (size_t i = 0; i < count; i++)
+        drape_list_add(list, sizeof list, known[i]);
     const char *meant = drape_did_you_mean(name, known, count);
     return drape_refuse(ctx, pointer, "unknown key \"%.60s\"; %s%s%s%s%s", name,
                         meant ? "did you mean \"" : "", meant ? meant : "", meant ? "\"? " : "",
@@ -406,9 +404,8 @@ drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const 
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
 {
-    char takes[RANGE_SIZE];
-    drape_param_takes_text(param, takes, sizeof takes);
-    return drape_refuse(ctx, pointer, "\"%s\" is missing: %s; %s", param->name, param->help, takes);
+    return drape_refuse(ctx, pointer, "\"%s\" is missing: %s; %s", param->name, param->help,
+                        DRAPE_PARAM_TAKES(param));
 }
 
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_entry *entry,
@@ -429,10 +426,8 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
                 names[k] = params[k].name;
             return drape_param_unknown(ctx, at, settings[s].name, names, (size_t)entry->param_count);
         }
-        drape_status status =
-            drape_param_value(ctx, at, &params[i], &settings[s], values + drape_param_place(params, i));
-        if (status)
-            return status;
+        DRAPE_TRY(
+            drape_param_value(ctx, at, &params[i], &settings[s], values + drape_param_place(params, i)));
         given[i] = true;
     }
     for (int i = 0; i < entry->param_count; i++)

@@ -51,14 +51,19 @@ int drape_param_find(const drape_param *params, int param_count, const char *nam
 /* Writes the range of a parameter: "(0, 1e9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b". */
 void drape_param_range_text(const drape_param *param, char *text, size_t size);
 
-/* The same with the kind of number: "a number in (0, 1e9] N/m". */
-void drape_param_takes_text(const drape_param *param, char *text, size_t size);
+/* The same with the kind of number: "a number in (0, 1e9] N/m". The macro makes it in place, valid until the
+ * end of the block. */
+const char *drape_param_takes_text(const drape_param *param, char *text, size_t size);
+#define DRAPE_PARAM_TAKES(param) drape_param_takes_text(param, (char[DRAPE_RANGE_SIZE]){0}, DRAPE_RANGE_SIZE)
+#define DRAPE_RANGE_SIZE         1024 /* lists of choices are long */
 
 /* Writes a value of a parameter: "0.001", "true", "report", "[0, 1, 0]". */
 void drape_param_value_text(const drape_param *param, const double *value, char *text, size_t size);
 
-/* Writes a number with enough digits to read back as itself: at least 10, without trailing zeros. */
-void drape_number_text(double number, char *text, size_t size);
+#define DRAPE_NUMBER_SIZE 32
+/* A number with enough digits to read back as itself, at least 10, without trailing zeros; in place. */
+const char *drape_number_text(double number, char text[DRAPE_NUMBER_SIZE]);
+#define DRAPE_NUMBER_TEXT(number) drape_number_text(number, (char[DRAPE_NUMBER_SIZE]){0})
 
 /* Returns the candidate nearest to word by edit distance; NULL if none is close enough to be a plausible
  * misspelling. */

@@ -6,9 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES 128 /* maximum number of names that a message lists */
-#define NAMES_SIZE                                                                                           \
-    800 /* [bytes] of their list; in DRAPE_UNKNOWN_SIZE it leaves room for a suggestion after it */
+#define MAX_NAMES  128 /* maximum number of names that a message lists */
+#define NAMES_SIZE 800 /* bytes of their list; DRAPE_UNKNOWN_SIZE has some more, for a suggestion after it */
 
 int drape_registry_count(const drape_registry *registry)
 {
@@ -40,12 +39,11 @@ void drape_registry_unknown(const drape_registry *registry, const drape_context 
 {
     const char *names[MAX_NAMES];
     char list[NAMES_SIZE] = "";
-    size_t count = 0, used = 0;
+    size_t count = 0;
     const drape_entry *entry;
     for (; count < MAX_NAMES && (entry = drape_registry_entry(registry, ctx, (int)count)) != NULL; count++) {
         names[count] = entry->name;
-        if (used < sizeof list)
-            used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", count ? ", " : "", entry->name);
+        drape_list_add(list, sizeof list, entry->name);
     }
     const char *meant = drape_did_you_mean(name, names, count);
     snprintf(text, DRAPE_UNKNOWN_SIZE, "there is no %s \"%.60s\"; there are %s%s%s%s", registry->noun, name,

@@ -1,4 +1,4 @@
-/* search.h: binary search in times that increase. */
+/* search.h: binary search in times that increase; sets that are joined. */
 #ifndef DRAPE_BASE_SEARCH_H
 #define DRAPE_BASE_SEARCH_H
 
@@ -16,6 +16,22 @@ static inline int64_t drape_last_time(const void *time, size_t stride, int64_t c
         *(*at <= t ? &low : &high) = middle;
     }
     return low;
+}
+
+/* Sets that are joined (union-find): parent[i] of each item begins as i, and leads to the lowest item of its
+ * set; path halving (Tarjan and van Leeuwen 1984, doi:10.1145/62.2160, section 2). */
+static inline int32_t drape_set_of(int32_t *parent, int32_t item)
+{
+    while (parent[item] != item)
+        item = parent[item] = parent[parent[item]];
+    return item;
+}
+
+static inline void drape_set_join(int32_t *parent, int32_t a, int32_t b)
+{
+    a = drape_set_of(parent, a);
+    b = drape_set_of(parent, b);
+    parent[a > b ? a : b] = a < b ? a : b;
 }
 
 #endif

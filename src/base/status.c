@@ -9,37 +9,31 @@ const char *drape_version(void)
     return DOTTED(DRAPE_VERSION_MAJOR, DRAPE_VERSION_MINOR, DRAPE_VERSION_PATCH);
 }
 
+/* The numbers of errors are negative. */
+static const char *const good[] = {
+    [DRAPE_OK] = "ok",
+    [DRAPE_RETRY_NONLINEAR] = "retry_nonlinear",
+    [DRAPE_RETRY_LINEAR] = "retry_linear",
+    [DRAPE_RETRY_NONFINITE] = "retry_nonfinite",
+    [DRAPE_RETRY_DEGENERATE] = "retry_degenerate",
+    [DRAPE_RETRY_REJECTED] = "retry_rejected",
+};
+static const char *const errors[] = {
+    [0] = "unknown",
+    [-DRAPE_E_ARGUMENT] = "e_argument",
+    [-DRAPE_E_MEMORY] = "e_memory",
+    [-DRAPE_E_FILE] = "e_file",
+    [-DRAPE_E_PARSE] = "e_parse",
+    [-DRAPE_E_STEP_TOO_SMALL] = "e_step_too_small",
+    [-DRAPE_E_SOLVER] = "e_solver",
+    [-DRAPE_E_VERSION] = "e_version",
+    [-DRAPE_E_STOPPED] = "e_stopped",
+};
+
 const char *drape_status_name(drape_status status)
 {
-    switch (status) {
-    case DRAPE_OK:
-        return "ok";
-    case DRAPE_RETRY_NONLINEAR:
-        return "retry_nonlinear";
-    case DRAPE_RETRY_LINEAR:
-        return "retry_linear";
-    case DRAPE_RETRY_NONFINITE:
-        return "retry_nonfinite";
-    case DRAPE_RETRY_DEGENERATE:
-        return "retry_degenerate";
-    case DRAPE_RETRY_REJECTED:
-        return "retry_rejected";
-    case DRAPE_E_ARGUMENT:
-        return "e_argument";
-    case DRAPE_E_MEMORY:
-        return "e_memory";
-    case DRAPE_E_FILE:
-        return "e_file";
-    case DRAPE_E_PARSE:
-        return "e_parse";
-    case DRAPE_E_STEP_TOO_SMALL:
-        return "e_step_too_small";
-    case DRAPE_E_SOLVER:
-        return "e_solver";
-    case DRAPE_E_VERSION:
-        return "e_version";
-    case DRAPE_E_STOPPED:
-        return "e_stopped";
-    }
-    return "unknown";
+    const int number = status, last_good = sizeof good / sizeof *good, last = sizeof errors / sizeof *errors;
+    if (number >= 0)
+        return number < last_good ? good[number] : errors[0];
+    return number > -last ? errors[-number] : errors[0];
 }

@@ -39,12 +39,19 @@ static inline void vec3_add_scaled(double s, const double *a, double *out)
     out[2] += s * a[2];
 }
 
-/* Twice the area of a triangle (three nodes) at x, along its normal. */
+/* The sides of a triangle (three nodes) at x: from its first node to the second and to the third one. */
+static inline void vec3_triangle_sides(const int32_t *node, const double *x, double to_second[3],
+                                       double to_third[3])
+{
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], to_second);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], to_third);
+}
+
+/* Twice the area of a triangle at x, along its normal. */
 static inline void vec3_triangle_area(const int32_t *node, const double *x, double area[3])
 {
     double u[3], v[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], v);
+    vec3_triangle_sides(node, x, u, v);
     vec3_cross(u, v, area);
 }
 

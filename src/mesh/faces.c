@@ -23,9 +23,7 @@ drape_status drape_faces_allocate(drape_context *ctx, const drape_mesh_source *s
     if (triangles > DRAPE_MAX_TRIANGLES || corners > 3 * (size_t)DRAPE_MAX_TRIANGLES)
         return drape_mesh_fail(ctx, source, 0, "%zu triangles; at most %d are allowed", triangles,
                                DRAPE_MAX_TRIANGLES);
-    const drape_status status = drape_mesh_allocate(ctx, source, nodes, triangles, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_mesh_allocate(ctx, source, nodes, triangles, mesh));
     drape_arena *arena = &mesh->arena;
     drape_faces *f = &mesh->faces;
     f->first = drape_arena_take(arena, faces + 1, sizeof *f->first);
@@ -46,7 +44,7 @@ drape_status drape_faces_allocate(drape_context *ctx, const drape_mesh_source *s
 
 /* ---- Division into triangles ---- */
 
-/* The polygon that is divided: numbers of its corners, in those of all faces. */
+/* The polygon that is divided: its corners, as numbers among the corners of all faces. */
 typedef struct polygon {
     const drape_mesh *mesh;
     int32_t *out;   /* the next triangle of faces.corner */
@@ -138,8 +136,8 @@ static int choose_ear(const polygon *p, const int *ring, const bool *ear, int co
     return best;
 }
 
-/* A cut can make ears of its two neighbours only: a convex corner that is in a triangle is there with one
- * that is not. */
+/* Cutting an ear can make new ears of its two neighbours only: another corner is no ear because its triangle
+ * contains a corner; then it also contains one that is not convex, and no cut removes that one. */
 static void cut_ears(polygon *p, int count)
 {
     int ring[MAX_EARS];
@@ -172,11 +170,10 @@ static drape_status divide(drape_mesh *mesh)
 {
     drape_faces *f = &mesh->faces;
     polygon p = {.mesh = mesh, .out = f->corner};
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < f->count; i++) {
+    for (int32_t i = 0; i < f->count; i++) {
         const int32_t count = f->first[i + 1] - f->first[i];
-        status = drape_check_cancel_after(mesh->arena.ctx,
-                                          16 * (size_t)(count <= MAX_EARS ? count * count : count));
+        DRAPE_TRY(drape_check_cancel_after(mesh->arena.ctx,
+                                           16 * (size_t)(count <= MAX_EARS ? count * count : count)));
         p.corner = f->first[i];
         if (count == 4) {
             const bool inside[2] = {is_inside(&p, 0), is_inside(&p, 1)};
@@ -196,7 +193,7 @@ static drape_status divide(drape_mesh *mesh)
     }
     for (size_t i = 0; i < 3 * (size_t)mesh->triangle_count; i++)
         mesh->triangle[i] = f->node[f->corner[i]];
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Texture coordinates ---- */
@@ -312,9 +309,9 @@ drape_status drape_faces_vertices(drape_arena *arena, const drape_mesh *mesh, dr
 {
     const drape_faces *f = &mesh->faces;
     const int32_t corners = 3 * mesh->triangle_count;
-    const size_t room = (size_t)(f->uv_count > 0 ? corners : mesh->node_count);
-    *vertices = (drape_vertices){.node = drape_arena_take(arena, room, sizeof *vertices->node),
-                                 .uv = drape_arena_take(arena, room, sizeof *vertices->uv),
+    const size_t capacity = (size_t)(f->uv_count > 0 ? corners : mesh->node_count);
+    *vertices = (drape_vertices){.node = drape_arena_take(arena, capacity, sizeof *vertices->node),
+                                 .uv = drape_arena_take(arena, capacity, sizeof *vertices->uv),
                                  .at = drape_arena_take(arena, (size_t)corners, sizeof *vertices->at)};
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;

@@ -6,7 +6,6 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define MAX_JSON ((size_t)1 << 28)
@@ -118,27 +117,24 @@ static bool take_integer(const json_t *value, double low, double high, int64_t *
 }
 
 /* A value as a message says it. */
-static const char *describe(const json_t *value, char *text, size_t size)
+static const char *describe(const json_t *value, char text[DRAPE_POINTER_SIZE])
 {
     static const char *const names[] = {[JSON_OBJECT] = "an object",
                                         [JSON_ARRAY] = "an array",
                                         [JSON_TRUE] = "true",
                                         [JSON_FALSE] = "false",
                                         [JSON_NULL] = "null"};
-    if (json_is_number(value))
-        snprintf(text, size, "%.17g", json_number_value(value));
-    else if (json_is_string(value))
-        snprintf(text, size, "\"%.30s\"", json_string_value(value));
-    else
-        snprintf(text, size, "%s", value ? names[json_typeof(value)] : "missing");
-    return text;
+    return json_is_number(value)   ? drape_format(text, "%.17g", json_number_value(value))
+           : json_is_string(value) ? drape_format(text, "\"%.30s\"", json_string_value(value))
+           : value                 ? names[json_typeof(value)]
+                                   : "missing";
 }
+#define DESCRIBE(value) describe(value, (char[DRAPE_POINTER_SIZE]){0})
 
 int32_t drape_gltf_index_of(drape_gltf *g, const char *owner, const json_t *value, int32_t limit)
 {
     int64_t index = -1;
-    char given[40];
-    describe(value, given, sizeof given);
+    const char *given = DESCRIBE(value);
     if (limit == 0)
         FAIL(g, "%s: %s; the file has nothing that it could refer to", owner, given);
     else if (!take_integer(value, 0, (double)limit - 1, &index))
@@ -253,17 +249,16 @@ static void copy_element(const component *c, bool normalized, const char *from, 
     }
 }
 
-/* Elements that replace others, by their numbers, which increase. */
+/* Replaces some elements of *out: a sparse accessor lists their numbers, in ascending order, and values. */
 static drape_status read_sparse(drape_gltf *g, const char *owner, const json_t *sparse, const component *c,
                                 bool normalized, const drape_gltf_array *out)
 {
     const json_t *indices = json_object_get(sparse, "indices"), *given = json_object_get(sparse, "count");
     int64_t count, before = -1, stride[2];
-    char text[40];
     const char *part = DRAPE_FORMAT("%s, sparse", owner);
     if (!take_integer(given, 0, (double)out->count, &count))
-        return FAIL(g, "%s: \"count\": %s; it must be an integer from 0 to %" PRId64, part,
-                    describe(given, text, sizeof text), out->count);
+        return FAIL(g, "%s: \"count\": %s; it must be an integer from 0 to %" PRId64, part, DESCRIBE(given),
+                    out->count);
     const component *type = find_component(indices);
     if (!type || type->negative)
         return FAIL(g, "%s: its indices must be unsigned integers", part);
@@ -312,7 +307,6 @@ drape_gltf_array drape_gltf_read(drape_gltf *g, const char *parent, const json_t
     const char *type = json_string_value(json_object_get(object, "type"));
     const component *c = find_component(object);
     const bool integer = c && c->largest > 0 && !json_is_true(json_object_get(object, "normalized"));
-    char text[40];
     drape_gltf_array out = {.width = want->width};
     if (g->status || accessor < 0)
         return out;
@@ -322,15 +316,14 @@ drape_gltf_array drape_gltf_read(drape_gltf *g, const char *parent, const json_t
         FAIL(g, "%s: its type is %.20s; %s is needed", owner, type ? type : "missing",
              drape_gltf_types[want->width]);
     if (!take_integer(count, 1, 0x1p31, &out.count))
-        FAIL(g, "%s: \"count\": %s; it must be an integer from 1 to 2^31", owner,
-             describe(count, text, sizeof text));
+        FAIL(g, "%s: \"count\": %s; it must be an integer from 1 to 2^31", owner, DESCRIBE(count));
     if (want->expected >= 0 && out.count != want->expected)
         FAIL(g, "%s: %" PRId64 " elements; %" PRId64 " are needed", owner, out.count, want->expected);
     if (want->expected < 0 && !json_object_get(object, "bufferView"))
         FAIL(g, "%s has no \"bufferView\"", owner);
     if (!c || (want->integer ? !integer || c->negative : integer))
         FAIL(g, "%s: its numbers have the type %s; %s are needed", owner,
-             describe(json_object_get(object, "componentType"), text, sizeof text),
+             DESCRIBE(json_object_get(object, "componentType")),
              want->integer ? "unsigned integers" : "floats or normalized integers");
     if (!g->status)
         read_elements(g, owner, object, c, &out);

@@ -91,6 +91,8 @@ typedef struct drape_gltf_want {
 } drape_gltf_want;
 drape_gltf_array drape_gltf_read(drape_gltf *gltf, const char *owner, const json_t *object,
                                  const drape_gltf_want *want);
+#define DRAPE_GLTF_READ(gltf, owner, object, ...)                                                            \
+    drape_gltf_read(gltf, owner, object, &(drape_gltf_want){__VA_ARGS__})
 
 /* ---- The scene: nodes, and the first animation, which moves them (sections 3.5, 3.7.3 and 3.11) ---- */
 

@@ -8,7 +8,6 @@
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #define NEARLY_EQUAL 1e-6  /* [rad] below this, quaternions are interpolated linearly, to 1e-18 */
@@ -78,9 +77,9 @@ static void read_node(const drape_gltf_scene *s, int32_t index)
     drape_gltf *g = s->gltf;
     const json_t *object = drape_gltf_item(g, "nodes", index), *child;
     drape_gltf_node *n = &s->nodes[index];
-    char owner[64];
+    const char *owner = DRAPE_FORMAT("node %d", (int)index),
+               *children = DRAPE_FORMAT("node %d: \"children\"", (int)index);
     size_t i;
-    snprintf(owner, sizeof owner, "node %d", (int)index);
     n->mesh = drape_gltf_index(g, owner, object, "mesh", drape_gltf_count(g, "meshes"));
     n->skin = drape_gltf_index(g, owner, object, "skin", drape_gltf_count(g, "skins"));
     double matrix[16] = {0};
@@ -111,10 +110,9 @@ static void read_node(const drape_gltf_scene *s, int32_t index)
             drape_gltf_numbers(g, owner, object, "weights", count, n->weight);
         }
     }
-    snprintf(owner, sizeof owner, "node %d: \"children\"", (int)index);
     json_array_foreach(json_object_get(object, "children"), i, child)
     {
-        const int32_t number = drape_gltf_index_of(g, owner, child, s->node_count);
+        const int32_t number = drape_gltf_index_of(g, children, child, s->node_count);
         if (number < 0)
             return;
         if (s->nodes[number].parent >= 0)
@@ -207,8 +205,7 @@ static drape_status read_sampler(const drape_gltf_scene *s, const char *owner, c
     if (name && strcmp(names[c->kind], name) != 0)
         return FAIL(g, "%s: its interpolation is %.30s; LINEAR, STEP or CUBICSPLINE is needed", owner, name);
     c->time =
-        drape_gltf_read(g, owner, sampler,
-                        &(drape_gltf_want){.key = "input", .purpose = "times", .width = 1, .expected = -1});
+        DRAPE_GLTF_READ(g, owner, sampler, .key = "input", .purpose = "times", .width = 1, .expected = -1);
     const int64_t keys = c->time.count * (c->kind == CUBIC ? 3 : 1);
     const drape_gltf_want want = {.key = "output",
                                   .purpose = "values of an animation",

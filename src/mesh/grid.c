@@ -19,12 +19,11 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
                                  drape_mesh *mesh)
 {
     const drape_mesh_source source = {.pointer = pointer};
-    const drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    DRAPE_TRY(drape_grid_check_size(ctx, pointer, columns, rows));
     mesh->rows = rows;
     mesh->columns = columns;
-    return status ? status
-                  : drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
-                                        2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
+    return drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                               2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
 }
 
 double drape_grid_random(uint64_t *seed)
@@ -62,12 +61,10 @@ drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const
 {
     int i;
     const char *place = DRAPE_FORMAT("%s/grid", pointer);
-    drape_status status = drape_registry_choose(ctx, &drape_grid_registry, place, grid->type, &i);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_registry_choose(ctx, &drape_grid_registry, place, grid->type, &i));
 
     const drape_grid_ops *ops = drape_grids[i];
     double values[DRAPE_MAX_PARAMS];
-    status = drape_params_resolve(ctx, pointer, &ops->entry, grid->settings, grid->setting_count, values);
-    return status ? status : ops->generate(ctx, pointer, values, mesh);
+    DRAPE_TRY(drape_params_resolve(ctx, pointer, &ops->entry, grid->settings, grid->setting_count, values));
+    return ops->generate(ctx, pointer, values, mesh);
 }

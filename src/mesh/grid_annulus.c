@@ -26,15 +26,12 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 {
     const int32_t columns = (int32_t)values[SPOKES], rows = (int32_t)values[CIRCLES];
     const drape_mesh_source source = {.pointer = pointer};
-    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status && !(values[OUTER] > values[INNER]))
-        status = drape_fail_below(ctx, pointer, "outer_radius", "%g m; it is larger than inner_radius, %g m",
-                                  values[OUTER], values[INNER]);
-    if (!status)
-        status = drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
-                                     2 * (size_t)(rows - 1) * (size_t)columns, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_grid_check_size(ctx, pointer, columns, rows));
+    if (!(values[OUTER] > values[INNER]))
+        return drape_fail_below(ctx, pointer, "outer_radius", "%g m; it is larger than inner_radius, %g m",
+                                values[OUTER], values[INNER]);
+    DRAPE_TRY(drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                                  2 * (size_t)(rows - 1) * (size_t)columns, mesh));
     mesh->rows = rows;
     mesh->columns = columns;
     const double two_pi = 6.28318530717958647693, inner = values[INNER],

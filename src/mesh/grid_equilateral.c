@@ -33,9 +33,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
                   rows = isnan(values[STRIPS]) ? columns : (int32_t)values[STRIPS] + 1;
     const double length = values[EDGE_LENGTH];
 
-    const drape_status status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_grid_allocate(ctx, pointer, rows, columns, mesh));
     double *x = mesh->x;
     for (int32_t row = 0; row < rows; row++)
         for (int32_t column = 0; column < columns; column++, x += 3) {

@@ -29,9 +29,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 {
     const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
     const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
-    const drape_status status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_grid_allocate(ctx, pointer, rows, columns, mesh));
     const int32_t last_row = mesh->rows - 1, last_column = mesh->columns - 1;
     const double jitter = values[JITTER];
     uint64_t seed = (uint64_t)values[SEED];

@@ -40,18 +40,15 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     const double radian = DRAPE_PI / 180, run = values[BOTTOM] - values[TOP], drop = values[HEIGHT],
                  chord = drape_hypot(run, drop), arc = values[ARC],
                  middle[2] = {(values[TOP] + values[BOTTOM]) / 2, -drop / 2};
-    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
-    if (!status && !(chord > 0))
-        status = drape_fail_below(ctx, pointer, "height", "0 m, and both circles have the radius %g m",
-                                  values[TOP]);
-    if (!status && arc != 0 && !(arc >= chord / 2 * (1 - 1e-12)))
-        status =
-            drape_fail_below(ctx, pointer, "arc_radius",
-                             "%g m; it is at least half the distance of the circles, %g m", arc, chord / 2);
-    if (!status)
-        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_grid_check_size(ctx, pointer, columns, rows));
+    if (!(chord > 0))
+        return drape_fail_below(ctx, pointer, "height", "0 m, and both circles have the radius %g m",
+                                values[TOP]);
+    if (arc != 0 && !(arc >= chord / 2 * (1 - 1e-12)))
+        return drape_fail_below(ctx, pointer, "arc_radius",
+                                "%g m; it is at least half the distance of the circles, %g m", arc,
+                                chord / 2);
+    DRAPE_TRY(drape_grid_allocate(ctx, pointer, rows, columns, mesh));
     /* The points of a meridian are middle + sine of an angle times along + (cosine - least) times out, as
      * radius and y, at angles from -half to half; a straight one has half = 0. */
     double along[2] = {run, -drop}, out[2] = {0}, half = 0, least = 0;

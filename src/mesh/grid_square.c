@@ -36,9 +36,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
     const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
 
-    const drape_status status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_grid_allocate(ctx, pointer, rows, columns, mesh));
     mesh->rectangular = true;
     double *x = mesh->x;
     for (int32_t row = 0; row < mesh->rows; row++)

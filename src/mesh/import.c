@@ -1,8 +1,4 @@
 /* import.c: passes a mesh file to the format that its extension names. */
-#include <stdio.h>
-#include <string.h>
-#include <strings.h>
-
 #include "mesh/contents.h"
 #include "mesh/mesh.h"
 
@@ -11,13 +7,10 @@ drape_status drape_mesh_read(drape_context *ctx, const char *pointer, const char
 {
     const drape_import_ops *import = NULL;
     char known[256] = "";
-    size_t used = 0, length = strlen(file);
     for (int i = 0; !import && drape_imports[i]; i++) {
-        const char *ending = drape_imports[i]->ending;
-        if (length > strlen(ending) && strcasecmp(file + length - strlen(ending), ending) == 0)
+        if (drape_ends_in(file, drape_imports[i]->ending))
             import = drape_imports[i];
-        if (used < sizeof known)
-            used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", ending);
+        drape_list_add(known, sizeof known, drape_imports[i]->ending);
     }
     if (!import)
         return drape_refuse(ctx, pointer, "%s: unknown ending; known are %s", file, known);

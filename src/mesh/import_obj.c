@@ -30,26 +30,26 @@ typedef struct obj_reader {
     drape_context *ctx;
     const drape_mesh_source *source;
     drape_mesh *mesh;
-    drape_text text;
+    drape_words text;
     int32_t nodes, uvs, faces, corners, materials; /* so far */
     drape_word *material;                          /* the name of each usemtl */
     char *file;                                    /* names of mtllib, one a line */
     size_t file_size;                              /* of that so far */
 } obj_reader;
 
-static drape_text open_text(const char *data, size_t size)
+static drape_words open_text(const char *data, size_t size)
 {
-    drape_text text = drape_text_open(data, size);
+    drape_words text = drape_words_open(data, size);
     text.comment = '#';
     text.continuation = true;
     return text;
 }
 
-/* The rest of the line: names may contain blanks. Those at its end do not belong to it. */
-static drape_word rest_of_line(drape_text *text)
+/* The rest of the line, without blanks at its end: names may contain blanks. */
+static drape_word rest_of_line(drape_words *text)
 {
     drape_word word, rest = {text->at, 0};
-    for (bool first = true; drape_text_next_word(text, &word); first = false) {
+    for (bool first = true; drape_words_next(text, &word); first = false) {
         rest.start = first ? word.start : rest.start;
         rest.length = (size_t)(word.start + word.length - rest.start);
     }
@@ -58,11 +58,11 @@ static drape_word rest_of_line(drape_text *text)
 
 static obj_count count_statements(const char *data, size_t size)
 {
-    drape_text text = open_text(data, size);
+    drape_words text = open_text(data, size);
     obj_count count = {0};
     do {
         drape_word word;
-        if (!drape_text_next_word(&text, &word))
+        if (!drape_words_next(&text, &word))
             continue;
         count.nodes += drape_word_is(word, "v");
         count.uvs += drape_word_is(word, "vt");
@@ -70,9 +70,9 @@ static obj_count count_statements(const char *data, size_t size)
         if (drape_word_is(word, "mtllib"))
             count.file_size += rest_of_line(&text).length + 1;
         if (drape_word_is(word, "f"))
-            for (count.faces++; drape_text_next_word(&text, &word);)
+            for (count.faces++; drape_words_next(&text, &word);)
                 count.corners++;
-    } while (drape_text_next_line(&text));
+    } while (drape_words_next_line(&text));
     return count;
 }
 
@@ -81,11 +81,11 @@ static drape_status read_node(obj_reader *reader)
     double *x = reader->mesh->x + 3 * (size_t)reader->nodes++;
     for (int axis = 0; axis < 3; axis++) {
         drape_word word;
-        if (!drape_text_next_word(&reader->text, &word))
+        if (!drape_words_next(&reader->text, &word))
             return FAIL(reader, "a node with %d coordinates; it needs x, y and z", axis);
         if (!drape_word_number(word, &x[axis]))
             return FAIL(reader, "%c of a node is \"%.*s\"; it must be a finite number", "xyz"[axis],
-                        drape_word_shown(word), word.start);
+                        DRAPE_WORD(word));
     }
     return DRAPE_OK;
 }
@@ -96,7 +96,7 @@ static void read_uv(obj_reader *reader)
     double *uv = reader->mesh->faces.uv + 2 * (size_t)reader->uvs++;
     drape_word word;
     for (int axis = 0; axis < 2; axis++)
-        if (drape_text_next_word(&reader->text, &word) ? !drape_word_number(word, &uv[axis]) : axis == 0)
+        if (drape_words_next(&reader->text, &word) ? !drape_word_number(word, &uv[axis]) : axis == 0)
             uv[axis] = NAN;
 }
 
@@ -120,8 +120,7 @@ static drape_status read_corner(const obj_reader *reader, drape_word word, int32
 {
     int64_t number[3] = {0};
     if (!corner_numbers(word, number))
-        return FAIL(reader, "a corner is \"%.*s\"; it must be v, v/vt, v//vn or v/vt/vn",
-                    drape_word_shown(word), word.start);
+        return FAIL(reader, "a corner is \"%.*s\"; it must be v, v/vt, v//vn or v/vt/vn", DRAPE_WORD(word));
     const int64_t index = number[0] < 0 ? reader->nodes + number[0] : number[0] - 1;
     if (index < 0 || index >= reader->mesh->node_count) {
         const long long n = (long long)number[0];
@@ -144,11 +143,9 @@ static drape_status read_polygon(obj_reader *reader)
     drape_word word;
     const int32_t first = reader->corners;
     int32_t given = 0, end = first;
-    for (; drape_text_next_word(&reader->text, &word); given++) {
+    for (; drape_words_next(&reader->text, &word); given++) {
         faces->uv_of[end] = -1;
-        const drape_status status = read_corner(reader, word, &faces->node[end], &faces->uv_of[end]);
-        if (status)
-            return status;
+        DRAPE_TRY(read_corner(reader, word, &faces->node[end], &faces->uv_of[end]));
         end += end == first || faces->node[end] != faces->node[end - 1];
     }
     while (end - first > 1 && faces->node[end - 1] == faces->node[first])
@@ -169,7 +166,7 @@ static drape_status read_statements(obj_reader *reader)
     drape_status status = DRAPE_OK;
     do {
         drape_word word;
-        if (!drape_text_next_word(&reader->text, &word))
+        if (!drape_words_next(&reader->text, &word))
             continue;
         if (drape_word_is(word, "v"))
             status = read_node(reader);
@@ -187,7 +184,7 @@ static drape_status read_statements(obj_reader *reader)
         } else if (drape_word_is(word, "f"))
             status = read_polygon(reader);
         status = status ? status : drape_check_cancel_after(reader->ctx, 64);
-    } while (!status && drape_text_next_line(&reader->text));
+    } while (!status && drape_words_next_line(&reader->text));
     return status;
 }
 

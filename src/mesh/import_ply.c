@@ -58,7 +58,7 @@ typedef struct ply_reader {
     drape_context *ctx;
     const drape_mesh_source *source;
     drape_mesh *mesh;
-    drape_text text; /* the header, later the data, whether ascii or binary */
+    drape_words text; /* the header, later the data, whether ascii or binary */
     ply_format format;
     ply_element elements[MAX_ELEMENTS];
     ply_property properties[MAX_PROPERTIES];
@@ -71,7 +71,7 @@ typedef struct ply_reader {
     size_t faces, corners; /* so far */
     int64_t list_count;    /* of the texture coordinates of this face's corners, which begin at `list` */
     ply_type list_type;
-    drape_text list;
+    drape_words list;
 } ply_reader;
 
 /* Reports a fault at the present place: a line or, in binary data, an item. */
@@ -86,8 +86,7 @@ static drape_status fail(const ply_reader *reader, const char *format, ...)
     va_end(args);
     if (!reader->element || reader->format == ASCII)
         return drape_mesh_fail(reader->ctx, reader->source, reader->text.line, "%s", text);
-    return drape_mesh_fail(reader->ctx, reader->source, 0, "%.*s %lld: %s",
-                           drape_word_shown(reader->element->name), reader->element->name.start,
+    return drape_mesh_fail(reader->ctx, reader->source, 0, "%.*s %lld: %s", DRAPE_WORD(reader->element->name),
                            (long long)reader->item, text);
 }
 
@@ -96,7 +95,7 @@ static drape_status fail(const ply_reader *reader, const char *format, ...)
 /* Takes the next word of a header line; what: its description, for the message if there is none. */
 static drape_status take(ply_reader *reader, const char *what, drape_word *word)
 {
-    if (drape_text_next_word(&reader->text, word))
+    if (drape_words_next(&reader->text, word))
         return DRAPE_OK;
     return fail(reader, "the line ends before %s", what);
 }
@@ -107,21 +106,17 @@ static drape_status read_format(ply_reader *reader)
                                         [LITTLE_ENDIAN_BYTES] = "binary_little_endian",
                                         [BIG_ENDIAN_BYTES] = "binary_big_endian"};
     drape_word name, version;
-    drape_status status = take(reader, "the name of the format", &name);
-    if (!status)
-        status = take(reader, "the version of the format", &version);
-    if (status)
-        return status;
+    DRAPE_TRY(take(reader, "the name of the format", &name));
+    DRAPE_TRY(take(reader, "the version of the format", &version));
     reader->format = NO_FORMAT;
     for (int format = ASCII; format <= BIG_ENDIAN_BYTES; format++)
         if (drape_word_is(name, names[format]))
             reader->format = (ply_format)format;
     if (reader->format == NO_FORMAT)
-        return fail(reader, "format \"%.*s\"; it must be one of: %s, %s, %s", drape_word_shown(name),
-                    name.start, names[ASCII], names[LITTLE_ENDIAN_BYTES], names[BIG_ENDIAN_BYTES]);
+        return fail(reader, "format \"%.*s\"; it must be one of: %s, %s, %s", DRAPE_WORD(name), names[ASCII],
+                    names[LITTLE_ENDIAN_BYTES], names[BIG_ENDIAN_BYTES]);
     if (!drape_word_is(version, "1.0"))
-        return fail(reader, "version \"%.*s\" of the format; it must be 1.0", drape_word_shown(version),
-                    version.start);
+        return fail(reader, "version \"%.*s\" of the format; it must be 1.0", DRAPE_WORD(version));
     return DRAPE_OK;
 }
 
@@ -137,19 +132,14 @@ static drape_status read_element(ply_reader *reader)
 {
     ply_element element = {.line = reader->text.line, .first_property = reader->property_count};
     drape_word count;
-    drape_status status = take(reader, "the name of the element", &element.name);
-    if (!status)
-        status = take(reader, "the count of the element", &count);
-    if (status)
-        return status;
+    DRAPE_TRY(take(reader, "the name of the element", &element.name));
+    DRAPE_TRY(take(reader, "the count of the element", &count));
     if (!drape_word_integer(count, &element.count) || element.count < 0)
-        return fail(reader, "count \"%.*s\"; it must be a whole number from 0", drape_word_shown(count),
-                    count.start);
+        return fail(reader, "count \"%.*s\"; it must be a whole number from 0", DRAPE_WORD(count));
     for (int i = 0; i < reader->element_count; i++)
         if (reader->elements[i].name.length == element.name.length &&
             memcmp(reader->elements[i].name.start, element.name.start, element.name.length) == 0)
-            return fail(reader, "element %.*s is defined twice", drape_word_shown(element.name),
-                        element.name.start);
+            return fail(reader, "element %.*s is defined twice", DRAPE_WORD(element.name));
     if (reader->element_count == MAX_ELEMENTS)
         return fail(reader, "more than %d elements", MAX_ELEMENTS);
     reader->elements[reader->element_count++] = element;
@@ -163,7 +153,7 @@ static drape_status take_type(ply_reader *reader, drape_word word, ply_type *typ
             *type = (ply_type)i;
             return DRAPE_OK;
         }
-    return fail(reader, "unknown type \"%.*s\"", drape_word_shown(word), word.start);
+    return fail(reader, "unknown type \"%.*s\"", DRAPE_WORD(word));
 }
 
 static bool is_integer(ply_type type)
@@ -200,12 +190,12 @@ static drape_status add_property(ply_reader *reader, ply_property property, drap
         return fail(reader, "the count of a list is %s; it must be an integer type",
                     types[property.count_type].name);
     if (property.role == CORNERS && !is_integer(property.type))
-        return fail(reader, "%.*s are %s; they must be of an integer type", drape_word_shown(name),
-                    name.start, types[property.type].name);
+        return fail(reader, "%.*s are %s; they must be of an integer type", DRAPE_WORD(name),
+                    types[property.type].name);
     if (property.role >= NEEDED_ROLES && property.role != PASSED_OVER && reader->has_role[property.role])
         property.role = PASSED_OVER; /* a second set of texture coordinates */
     if (property.role != PASSED_OVER && reader->has_role[property.role])
-        return fail(reader, "property %.*s is defined twice", drape_word_shown(name), name.start);
+        return fail(reader, "property %.*s is defined twice", DRAPE_WORD(name));
     if (reader->property_count == MAX_PROPERTIES)
         return fail(reader, "more than %d properties", MAX_PROPERTIES);
     if (property.role != PASSED_OVER)
@@ -221,19 +211,15 @@ static drape_status read_property(ply_reader *reader)
     drape_word word;
     if (reader->element_count == 0)
         return fail(reader, "a property before the first element");
-    drape_status status = take(reader, "the type of the property", &word);
-    if (!status && drape_word_is(word, "list")) {
-        status = take(reader, "the type of the list's count", &word);
-        if (!status)
-            status = take_type(reader, word, &property.count_type);
-        if (!status)
-            status = take(reader, "the type of the list's values", &word);
+    DRAPE_TRY(take(reader, "the type of the property", &word));
+    if (drape_word_is(word, "list")) {
+        DRAPE_TRY(take(reader, "the type of the list's count", &word));
+        DRAPE_TRY(take_type(reader, word, &property.count_type));
+        DRAPE_TRY(take(reader, "the type of the list's values", &word));
     }
-    if (!status)
-        status = take_type(reader, word, &property.type);
-    if (!status)
-        status = take(reader, "the name of the property", &word);
-    return status ? status : add_property(reader, property, word);
+    DRAPE_TRY(take_type(reader, word, &property.type));
+    DRAPE_TRY(take(reader, "the name of the property", &word));
+    return add_property(reader, property, word);
 }
 
 static drape_status read_header_line(ply_reader *reader, drape_word keyword)
@@ -246,7 +232,7 @@ static drape_status read_header_line(ply_reader *reader, drape_word keyword)
         return read_property(reader);
     if (drape_word_is(keyword, "comment") || drape_word_is(keyword, "obj_info"))
         return DRAPE_OK;
-    return fail(reader, "unknown keyword \"%.*s\"", drape_word_shown(keyword), keyword.start);
+    return fail(reader, "unknown keyword \"%.*s\"", DRAPE_WORD(keyword));
 }
 
 static drape_status check_contents(const ply_reader *reader)
@@ -268,19 +254,17 @@ static drape_status check_contents(const ply_reader *reader)
 static drape_status read_header(ply_reader *reader)
 {
     drape_word word;
-    if (!drape_text_next_word(&reader->text, &word) || !drape_word_is(word, "ply"))
+    if (!drape_words_next(&reader->text, &word) || !drape_word_is(word, "ply"))
         return fail(reader, "the first line must be \"ply\"");
-    while (drape_text_next_line(&reader->text)) {
-        if (!drape_text_next_word(&reader->text, &word))
+    while (drape_words_next_line(&reader->text)) {
+        if (!drape_words_next(&reader->text, &word))
             continue;
         if (drape_word_is(word, "end_header")) {
             const drape_status status = check_contents(reader);
-            drape_text_next_line(&reader->text);
+            drape_words_next_line(&reader->text);
             return status;
         }
-        const drape_status status = read_header_line(reader, word);
-        if (status)
-            return status;
+        DRAPE_TRY(read_header_line(reader, word));
     }
     return fail(reader, "the header has no end_header");
 }
@@ -301,8 +285,8 @@ static drape_status check_counts(ply_reader *reader)
         if (least > 0 && element->count > left / least)
             return drape_mesh_fail(reader->ctx, reader->source, element->line,
                                    "%lld items of %.*s; the %lld bytes after the header hold at most %lld",
-                                   (long long)element->count, drape_word_shown(element->name),
-                                   element->name.start, (long long)(reader->text.end - reader->text.at),
+                                   (long long)element->count, DRAPE_WORD(element->name),
+                                   (long long)(reader->text.end - reader->text.at),
                                    (long long)(left / least));
     }
     return DRAPE_OK;
@@ -336,15 +320,14 @@ static double decode(ply_type type, const unsigned char *bytes, bool big_endian)
 /* Reads the next value; a NULL value skips it. */
 static drape_status read_value(ply_reader *reader, ply_type type, double *value)
 {
-    drape_text *text = &reader->text;
+    drape_words *text = &reader->text;
     if (reader->format == ASCII) {
         drape_word word;
-        if (!drape_text_next_word(text, &word))
+        if (!drape_words_next(text, &word))
             return fail(reader, "the line ends before all values of its %.*s",
-                        drape_word_shown(reader->element->name), reader->element->name.start);
+                        DRAPE_WORD(reader->element->name));
         if (value && !drape_word_number(word, value))
-            return fail(reader, "value \"%.*s\"; it must be a finite number", drape_word_shown(word),
-                        word.start);
+            return fail(reader, "value \"%.*s\"; it must be a finite number", DRAPE_WORD(word));
         return DRAPE_OK;
     }
     if ((size_t)(text->end - text->at) < types[type].size)
@@ -355,7 +338,7 @@ static drape_status read_value(ply_reader *reader, ply_type type, double *value)
     return DRAPE_OK;
 }
 
-/* Those of corners come before those of vertices. */
+/* Texture coordinates of vertices count only where corners have none. */
 static bool has_vertex_uvs(const ply_reader *reader)
 {
     return reader->has_role[U] && reader->has_role[V] && !reader->has_role[CORNER_UVS];
@@ -366,9 +349,7 @@ static drape_status read_polygon(ply_reader *reader, ply_type type, int64_t corn
     drape_faces *faces = &reader->mesh->faces;
     for (int64_t corner = 0; corner < corners; corner++) {
         double value = 0;
-        const drape_status status = read_value(reader, type, &value);
-        if (status)
-            return status;
+        DRAPE_TRY(read_value(reader, type, &value));
         if (!(value >= 0 && value < reader->mesh->node_count && value == floor(value)))
             return fail(reader, "there is no vertex %.10g; there are %d, counted from 0", value,
                         reader->mesh->node_count);
@@ -388,16 +369,14 @@ static void read_uv(ply_reader *reader, ply_type type, double *uv)
     drape_word word;
     if (reader->format != ASCII)
         read_value(reader, type, uv);
-    else if (!drape_text_next_word(&reader->text, &word) || !drape_word_number(word, uv))
+    else if (!drape_words_next(&reader->text, &word) || !drape_word_number(word, uv))
         *uv = NAN;
 }
 
 static drape_status read_list(ply_reader *reader, const ply_property *property)
 {
     double length = 0;
-    drape_status status = read_value(reader, property->count_type, &length);
-    if (status)
-        return status;
+    DRAPE_TRY(read_value(reader, property->count_type, &length));
     if (!(length >= 0 && length <= UINT32_MAX && length == floor(length)))
         return fail(reader, "a list of %.10g values; it must be a whole number from 0", length);
     const int64_t count = (int64_t)length;
@@ -410,13 +389,13 @@ static drape_status read_list(ply_reader *reader, const ply_property *property)
         reader->list_type = property->type;
         reader->list_count = count;
     }
-    for (int64_t i = 0; i < count && !status; i++)
-        status = read_value(reader, property->type, NULL);
-    if (!status && property->role == CORNERS) {
+    for (int64_t i = 0; i < count; i++)
+        DRAPE_TRY(read_value(reader, property->type, NULL));
+    if (property->role == CORNERS) {
         reader->faces++;
         reader->corners += (size_t)count;
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status read_property_value(ply_reader *reader, const ply_property *property)
@@ -428,14 +407,14 @@ static drape_status read_property_value(ply_reader *reader, const ply_property *
         return read_value(reader, property->type, NULL);
     if (role <= Z)
         return read_value(reader, property->type, &reader->mesh->x[3 * item + role]);
-    const drape_text before = reader->text;
-    const drape_status status = read_value(reader, property->type, NULL);
-    const drape_text after = reader->text;
+    const drape_words before = reader->text;
+    DRAPE_TRY(read_value(reader, property->type, NULL));
+    const drape_words after = reader->text;
     reader->text = before;
     if (has_vertex_uvs(reader))
         read_uv(reader, property->type, &reader->mesh->faces.uv[2 * item + (role - U)]);
     reader->text = after;
-    return status;
+    return DRAPE_OK;
 }
 
 /* In ascii data an item is a line; empty lines are skipped. */
@@ -443,12 +422,11 @@ static drape_status find_item_line(ply_reader *reader)
 {
     drape_word word;
     for (;;) {
-        drape_text ahead = reader->text;
-        if (drape_text_next_word(&ahead, &word))
+        drape_words ahead = reader->text;
+        if (drape_words_next(&ahead, &word))
             return DRAPE_OK;
-        if (!drape_text_next_line(&reader->text))
-            return fail(reader, "the file ends before %.*s %lld of %lld",
-                        drape_word_shown(reader->element->name), reader->element->name.start,
+        if (!drape_words_next_line(&reader->text))
+            return fail(reader, "the file ends before %.*s %lld of %lld", DRAPE_WORD(reader->element->name),
                         (long long)reader->item, (long long)reader->element->count);
     }
 }
@@ -456,16 +434,16 @@ static drape_status find_item_line(ply_reader *reader)
 static drape_status read_item(ply_reader *reader)
 {
     const ply_property *property = reader->properties + reader->element->first_property;
-    drape_status status = reader->format == ASCII ? find_item_line(reader) : DRAPE_OK;
-    for (int i = 0; i < reader->element->property_count && !status; i++)
-        status = read_property_value(reader, &property[i]);
-    if (!status && !reader->counting && reader->has_role[CORNER_UVS] &&
-        drape_word_is(reader->element->name, "face")) {
-        /* Texture coordinates of the corners of the last face. They may come before its corners, so that
-         * they are read after both: returns to the list. */
+    if (reader->format == ASCII)
+        DRAPE_TRY(find_item_line(reader));
+    for (int i = 0; i < reader->element->property_count; i++)
+        DRAPE_TRY(read_property_value(reader, &property[i]));
+    if (!reader->counting && reader->has_role[CORNER_UVS] && drape_word_is(reader->element->name, "face")) {
+        /* Texture coordinates of the corners of the last face: the reader returns to their list when it has
+         * the corners, which may follow the list. */
         drape_faces *faces = &reader->mesh->faces;
         const size_t first = (size_t)faces->first[reader->faces - 1], last = reader->corners;
-        const drape_text after = reader->text;
+        const drape_words after = reader->text;
         reader->text = reader->list;
         for (size_t c = first; c < last && reader->list_count == 2 * (int64_t)(last - first); c++) {
             faces->uv_of[c] = (int32_t)c;
@@ -474,54 +452,48 @@ static drape_status read_item(ply_reader *reader)
         }
         reader->text = after;
     }
-    if (status || reader->format != ASCII)
-        return status;
     drape_word word;
-    if (drape_text_next_word(&reader->text, &word))
-        return fail(reader, "\"%.*s\" after the last value of its %.*s", drape_word_shown(word), word.start,
-                    drape_word_shown(reader->element->name), reader->element->name.start);
-    drape_text_next_line(&reader->text);
+    if (reader->format != ASCII)
+        return DRAPE_OK;
+    if (drape_words_next(&reader->text, &word))
+        return fail(reader, "\"%.*s\" after the last value of its %.*s", DRAPE_WORD(word),
+                    DRAPE_WORD(reader->element->name));
+    drape_words_next_line(&reader->text);
     return DRAPE_OK;
 }
 
 /* Reads the items of all elements, from the present place of the text. */
 static drape_status read_items(ply_reader *reader, bool counting)
 {
-    drape_status status = DRAPE_OK;
     reader->counting = counting;
     reader->faces = reader->corners = 0;
-    for (int i = 0; i < reader->element_count && !status; i++) {
+    for (int i = 0; i < reader->element_count; i++) {
         reader->element = &reader->elements[i];
         if (reader->element->property_count == 0) /* items without properties take no byte and no line */
             continue;
-        for (int64_t item = 0; item < reader->element->count && !status; item++) {
+        for (int64_t item = 0; item < reader->element->count; item++) {
             reader->item = item;
-            status = read_item(reader);
-            status = status ? status : drape_check_cancel_after(reader->ctx, 64);
+            DRAPE_TRY(read_item(reader));
+            DRAPE_TRY(drape_check_cancel_after(reader->ctx, 64));
         }
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status read_ply(drape_context *ctx, const drape_mesh_source *source, const char *data,
                              size_t size, drape_mesh *mesh)
 {
-    ply_reader reader = {.ctx = ctx, .source = source, .mesh = mesh, .text = drape_text_open(data, size)};
-    drape_status status = read_header(&reader);
-    if (!status)
-        status = check_counts(&reader);
-    const drape_text items = reader.text;
-    if (!status)
-        status = read_items(&reader, true);
-    if (status)
-        return status;
+    ply_reader reader = {.ctx = ctx, .source = source, .mesh = mesh, .text = drape_words_open(data, size)};
+    DRAPE_TRY(read_header(&reader));
+    DRAPE_TRY(check_counts(&reader));
+    const drape_words items = reader.text;
+    DRAPE_TRY(read_items(&reader, true));
     const size_t nodes = (size_t)find_element(&reader, "vertex")->count;
     const size_t uvs = reader.has_role[CORNER_UVS] ? reader.corners : has_vertex_uvs(&reader) ? nodes : 0;
-    status = drape_faces_allocate(ctx, source, nodes, reader.faces, reader.corners, uvs, mesh);
+    DRAPE_TRY(drape_faces_allocate(ctx, source, nodes, reader.faces, reader.corners, uvs, mesh));
     reader.text = items;
-    if (!status)
-        status = read_items(&reader, false);
-    return status ? status : drape_faces_complete(ctx, mesh);
+    DRAPE_TRY(read_items(&reader, false));
+    return drape_faces_complete(ctx, mesh);
 }
 
 const drape_import_ops drape_import_ply = {

@@ -51,9 +51,7 @@ drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, con
     if (!x || !triangle)
         return drape_mesh_fail(ctx, &source, 0, "\"%s\" is missing: a mesh needs positions and triangles",
                                x ? "triangles" : "positions");
-    const drape_status status = drape_mesh_allocate(ctx, &source, node_count, triangle_count, mesh);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_mesh_allocate(ctx, &source, node_count, triangle_count, mesh));
     memcpy(mesh->x, x, 3 * node_count * sizeof *x);
     memcpy(mesh->triangle, triangle, 3 * triangle_count * sizeof *triangle);
     return DRAPE_OK;
@@ -71,11 +69,9 @@ drape_status drape_mesh_measure(drape_mesh *mesh)
         return DRAPE_E_MEMORY;
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
-        double u[3], v[3], normal[3];
-        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], u);
-        vec3_sub(mesh->x + 3 * (size_t)n[2], mesh->x + 3 * (size_t)n[0], v);
-        vec3_cross(u, v, normal);
-        mesh->triangle_area[triangle] = vec3_norm(normal) / 2;
+        double area[3];
+        vec3_triangle_area(n, mesh->x, area);
+        mesh->triangle_area[triangle] = vec3_norm(area) / 2;
         for (int k = 0; k < 3; k++)
             mesh->node_area[n[k]] += mesh->triangle_area[triangle] / 3;
     }
@@ -88,66 +84,64 @@ drape_status drape_mesh_measure(drape_mesh *mesh)
     return DRAPE_OK;
 }
 
-/* The place of its faults, in a buffer of that size, and the file. */
-static drape_mesh_source source_of(const char *pointer, const drape_mesh_def *def, char *place, size_t size)
+static drape_status place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                          const char *folder, drape_mesh *mesh)
 {
-    snprintf(place, size, "%s%s", pointer, def->file ? "/file" : "");
-    return (drape_mesh_source){.pointer = place, .file = def->file};
-}
-
-drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
-                              const char *folder, drape_mesh *mesh)
-{
-    char place[sizeof ctx->pointer];
-    const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
-
-    *mesh = (drape_mesh){0};
+    const drape_mesh_source source = {.pointer = DRAPE_FORMAT("%s%s", pointer, def->file ? "/file" : ""),
+                                      .file = def->file},
+                            moved = {.pointer = DRAPE_FORMAT("%s/transform", pointer)};
     const bool arrays = def->positions || def->triangles;
     const int count = (def->grid.type != NULL) + (def->file != NULL) + arrays;
     if (count != 1)
         return drape_refuse(ctx, pointer, "%d sources%s%s%s; a mesh has exactly one of grid, file, positions",
                             count, def->grid.type ? ", grid" : "", def->file ? ", file" : "",
                             arrays ? ", positions" : "");
-    drape_status status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
-    if (!status)
-        status = def->grid.type ? drape_mesh_from_grid(ctx, pointer, &def->grid, mesh)
-                 : def->file    ? drape_mesh_from_file(ctx, pointer, folder, def->file, mesh)
-                                : drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count,
-                                                         def->triangles, def->triangle_count, mesh);
-    status = status ? status : drape_check_cancel(ctx);
+    DRAPE_TRY(drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate));
+    DRAPE_TRY(def->grid.type ? drape_mesh_from_grid(ctx, pointer, &def->grid, mesh)
+              : def->file    ? drape_mesh_from_file(ctx, pointer, folder, def->file, mesh)
+                             : drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count,
+                                                      def->triangles, def->triangle_count, mesh));
+    DRAPE_TRY(drape_check_cancel(ctx));
     /* Positions are also checked before the transform, because a rotation spreads one coordinate that is not
      * a number to all three. */
-    if (!status)
-        status = drape_mesh_validate_positions(ctx, &source, mesh);
-    if (!status) {
-        drape_mesh_transform(mesh, def->scale, def->rotate, def->translate);
-        snprintf(place, sizeof place, "%s/transform", pointer);
-        status = drape_mesh_validate_positions(ctx, &(drape_mesh_source){.pointer = place}, mesh);
-    }
+    DRAPE_TRY(drape_mesh_validate_positions(ctx, &source, mesh));
+    drape_mesh_transform(mesh, def->scale, def->rotate, def->translate);
+    return drape_mesh_validate_positions(ctx, &moved, mesh);
+}
+
+static drape_status make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                         const char *folder, drape_mesh *mesh)
+{
+    const drape_mesh_source source = {.pointer = DRAPE_FORMAT("%s%s", pointer, def->file ? "/file" : ""),
+                                      .file = def->file};
+    DRAPE_TRY(place(ctx, pointer, def, folder, mesh));
+    DRAPE_TRY(drape_mesh_validate_triangles(ctx, &source, mesh));
+    DRAPE_TRY(drape_check_cancel(ctx));
+    DRAPE_TRY(drape_mesh_connect(ctx, &source, mesh));
+    DRAPE_TRY(drape_check_cancel(ctx));
+    DRAPE_TRY(drape_mesh_validate_nodes(ctx, &source, mesh));
+    return drape_mesh_measure(mesh);
+}
+
+static drape_status freed_after(drape_status status, drape_mesh *mesh)
+{
     if (status)
         drape_mesh_free(mesh);
     return status;
 }
 
+drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                              const char *folder, drape_mesh *mesh)
+{
+    *mesh = (drape_mesh){0};
+    return freed_after(place(ctx, pointer, def, folder, mesh), mesh);
+}
+
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                              const char *folder, drape_mesh *mesh)
 {
-    char place[sizeof ctx->pointer];
-    const drape_mesh_source source = source_of(pointer, def, place, sizeof place);
-    drape_status status = drape_mesh_place(ctx, pointer, def, folder, mesh);
-    if (!status)
-        status = drape_mesh_validate_triangles(ctx, &source, mesh);
-    status = status ? status : drape_check_cancel(ctx);
-    if (!status)
-        status = drape_mesh_connect(ctx, &source, mesh);
-    status = status ? status : drape_check_cancel(ctx);
-    if (!status)
-        status = drape_mesh_validate_nodes(ctx, &source, mesh);
-    if (!status)
-        status = drape_mesh_measure(mesh);
-    if (status)
-        drape_mesh_free(mesh);
-    return status;
+    *mesh = (drape_mesh){0};
+    return freed_after(make(ctx, pointer, def, folder, mesh), mesh);
 }
 
 void drape_mesh_drop_topology(drape_mesh *mesh)

@@ -23,7 +23,7 @@ static double distance(const drape_mesh *mesh, int32_t a, int32_t b)
 typedef struct open_node {
     double x;
     int32_t node, edge; /* edge: its number among the open ones */
-    int32_t same;       /* one before it in the list, or itself, at the same place */
+    int32_t same;       /* an earlier node of the list at the same place, or itself */
 } open_node;
 
 /* An open edge, by the first of the nodes at the places of its ends. */
@@ -54,7 +54,7 @@ static int32_t root_of(open_node *list, int32_t i)
     return i;
 }
 
-/* Joins the nodes that are nearer than the limit; the largest distance of one from that nearest to it. */
+/* Joins nodes that are nearer than the limit. Returns the largest distance of a node from its nearest. */
 static double join_near(const drape_mesh *mesh, open_node *list, int32_t count, double limit)
 {
     double largest = 0;
@@ -97,8 +97,8 @@ static bool edges_meet(open_node *list, int32_t count, open_edge *edge)
     return meet;
 }
 
-/* The distance by which the nodes of the open edges are to be merged so that the mesh is closed: the largest
- * of one of them from that nearest to it; INFINITY if merging does not close it, or without memory. */
+/* The distance within which nodes of open edges must be merged to close the mesh: the largest distance of
+ * such a node from its nearest. INFINITY if merging does not close the mesh, or without memory. */
 static double gap_of(drape_context *ctx, const drape_mesh *mesh, int32_t edges, double limit)
 {
     drape_arena scratch = drape_arena_of(ctx);

@@ -7,7 +7,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 #define MAX_FRAMES  1000000
 #define MAX_NUMBERS ((int64_t)1 << 31) /* of all frames: 16 GiB */
@@ -16,15 +15,11 @@
 static const drape_sequence_ops *find_format(drape_context *ctx, const char *pointer, const char *file)
 {
     char known[256] = "";
-    size_t used = 0, length = strlen(file);
     for (int i = 0; drape_sequences[i]; i++)
         for (int k = 0; drape_sequences[i]->endings[k]; k++) {
-            const char *ending = drape_sequences[i]->endings[k];
-            const size_t size = strlen(ending);
-            if (length > size && strcasecmp(file + length - size, ending) == 0)
+            if (drape_ends_in(file, drape_sequences[i]->endings[k]))
                 return drape_sequences[i];
-            if (used < sizeof known)
-                used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", ending);
+            drape_list_add(known, sizeof known, drape_sequences[i]->endings[k]);
         }
     drape_refuse(ctx, pointer, "%s: unknown ending; known are %s", file, known);
     return NULL;
@@ -75,15 +70,14 @@ static drape_status set_times(const drape_sequence_source *source, const char *p
         out->time[f] = def->start + fmin(out->first + out->step * f, out->last) / def->rate;
     if (!def->times)
         return check_times(ctx, &source->file, out);
-    drape_status status = drape_contents_read(source->scratch, at, source->folder, def->times, &whole);
-    if (!status)
-        status = drape_npy_array_parse(ctx, &file, whole.data, whole.size, &array);
-    if (!status && (array.dimensions != 1 || array.shape[0] != out->frame_count))
-        status = drape_mesh_fail(ctx, &file, 0, "%" PRId64 " times in %d dimensions; %d times are needed",
-                                 array.shape[0], array.dimensions, (int)out->frame_count);
-    for (int32_t f = 0; !status && f < out->frame_count; f++)
+    DRAPE_TRY(drape_contents_read(source->scratch, at, source->folder, def->times, &whole));
+    DRAPE_TRY(drape_npy_array_parse(ctx, &file, whole.data, whole.size, &array));
+    if (array.dimensions != 1 || array.shape[0] != out->frame_count)
+        return drape_mesh_fail(ctx, &file, 0, "%" PRId64 " times in %d dimensions; %d times are needed",
+                               array.shape[0], array.dimensions, (int)out->frame_count);
+    for (int32_t f = 0; f < out->frame_count; f++)
         out->time[f] = def->start + drape_npy_array_at(&array, (size_t)f);
-    return status ? status : check_times(ctx, &file, out);
+    return check_times(ctx, &file, out);
 }
 
 /* ---- Positions ---- */
@@ -94,16 +88,14 @@ drape_status drape_sequence_validate(drape_context *ctx, const drape_mesh_source
     drape_mesh at = *mesh;
     char frame[32];
     const drape_mesh_source part = {.pointer = source->pointer, .file = source->file, .part = frame};
-    drape_status status = DRAPE_OK;
-    for (int32_t f = 0; !status && f < sequence->frame_count; f++) {
+    for (int32_t f = 0; f < sequence->frame_count; f++) {
         snprintf(frame, sizeof frame, "frame %d: ", (int)f);
         at.x = sequence->x + 3 * (size_t)f * (size_t)sequence->node_count;
-        status = drape_mesh_validate_positions(ctx, &part, &at);
-        if (!status)
-            status = drape_mesh_validate_shapes(ctx, &part, &at);
-        status = status ? status : drape_check_cancel_after(ctx, 16 * (size_t)at.triangle_count);
+        DRAPE_TRY(drape_mesh_validate_positions(ctx, &part, &at));
+        DRAPE_TRY(drape_mesh_validate_shapes(ctx, &part, &at));
+        DRAPE_TRY(drape_check_cancel_after(ctx, 16 * (size_t)at.triangle_count));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_sequence_read(drape_arena *arena, const char *pointer, const char *folder,

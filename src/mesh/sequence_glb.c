@@ -33,7 +33,7 @@ typedef struct skin {
 typedef struct part {
     int32_t node, first, count;  /* its points, among all */
     int64_t triangle, triangles; /* its first, among all; their number */
-    bool mirrored;               /* its map turns it inside out, so that its triangles are turned, too */
+    bool mirrored;               /* its map turns it inside out: the order of corners is reversed */
     const double *x;             /* (count x 3) */
     const double **target;       /* (targets) each (count x 3); NULL: it moves nothing */
     int32_t targets, sets;       /* sets of four joints each */
@@ -47,7 +47,7 @@ typedef struct reader {
     skin *skins;
     part *parts;
     int32_t *corner; /* (triangle_count x 3) */
-    int64_t part_count, part_room, point_count, triangle_count, triangle_room;
+    int64_t part_count, part_capacity, point_count, triangle_count, triangle_capacity;
     double work; /* operations for a frame */
 } reader;
 
@@ -67,10 +67,9 @@ static void read_skin(reader *r, int32_t index)
     s->joint = drape_gltf_take(g, (size_t)s->count, sizeof *s->joint);
     s->inverse = drape_gltf_take(g, (size_t)s->count, sizeof *s->inverse);
     s->now = drape_gltf_take(g, (size_t)s->count, sizeof *s->now);
-    const double *inverse = drape_gltf_read(g, owner, object,
-                                            &(drape_gltf_want){"inverseBindMatrices", "inverse bind matrices",
-                                                               16, false, s->count})
-                                .value;
+    const double *inverse =
+        DRAPE_GLTF_READ(g, owner, object, "inverseBindMatrices", "inverse bind matrices", 16, false, s->count)
+            .value;
     if (inverse)
         drape_gltf_check_finite(g, owner, "inverse bind matrices", 16 * (size_t)s->count, inverse);
     for (int32_t k = 0; !g->status && k < s->count; k++) {
@@ -137,11 +136,8 @@ static void read_influences(reader *r, const char *owner, const json_t *attribut
         char name[2][24];
         snprintf(name[0], sizeof name[0], "JOINTS_%d", (int)k);
         snprintf(name[1], sizeof name[1], "WEIGHTS_%d", (int)k);
-        p->joint[k] =
-            drape_gltf_read(g, owner, attributes, &(drape_gltf_want){name[0], NULL, 4, true, p->count}).value;
-        p->weight[k] =
-            drape_gltf_read(g, owner, attributes, &(drape_gltf_want){name[1], NULL, 4, false, p->count})
-                .value;
+        p->joint[k] = DRAPE_GLTF_READ(g, owner, attributes, name[0], NULL, 4, true, p->count).value;
+        p->weight[k] = DRAPE_GLTF_READ(g, owner, attributes, name[1], NULL, 4, false, p->count).value;
         if (!p->joint[k] || !p->weight[k])
             FAIL(r, "%s: of %d sets of joints and weights it has no %s", owner, (int)p->sets,
                  name[p->joint[k] != NULL]);
@@ -150,13 +146,13 @@ static void read_influences(reader *r, const char *owner, const json_t *attribut
         check_influences(r, owner, p);
 }
 
-/* Memory for `needed` items, of which there is room for *room; NULL after a failure. */
-static void *grow(reader *r, void *items, int64_t needed, int64_t *room, size_t size)
+/* Items with memory for as many as needed, and the new capacity; NULL after a failure. */
+static void *grow(reader *r, void *items, int64_t needed, int64_t *capacity, size_t size)
 {
-    if (r->gltf.status || needed <= *room)
+    if (r->gltf.status || needed <= *capacity)
         return items;
-    *room = *room + needed;
-    void *grown = drape_arena_resize(r->gltf.arena, items, (size_t)*room, size);
+    *capacity = *capacity + needed;
+    void *grown = drape_arena_resize(r->gltf.arena, items, (size_t)*capacity, size);
     if (!grown)
         r->gltf.status = DRAPE_E_MEMORY;
     return grown ? grown : items;
@@ -165,8 +161,7 @@ static void *grow(reader *r, void *items, int64_t needed, int64_t *room, size_t 
 /* Without indices, each three points are a triangle. */
 static drape_status read_triangles(reader *r, const char *owner, const json_t *primitive, part *p)
 {
-    const drape_gltf_array index =
-        drape_gltf_read(&r->gltf, owner, primitive, &(drape_gltf_want){"indices", NULL, 1, true, -1});
+    const drape_gltf_array index = DRAPE_GLTF_READ(&r->gltf, owner, primitive, "indices", NULL, 1, true, -1);
     const int64_t corners = index.value ? index.count : p->count;
     p->triangles = corners / 3;
     if (corners % 3 != 0)
@@ -174,7 +169,7 @@ static drape_status read_triangles(reader *r, const char *owner, const json_t *p
     if (r->triangle_count + p->triangles > DRAPE_MAX_TRIANGLES)
         FAIL(r, "more than %d triangles", DRAPE_MAX_TRIANGLES);
     r->corner =
-        grow(r, r->corner, r->triangle_count + p->triangles, &r->triangle_room, 3 * sizeof *r->corner);
+        grow(r, r->corner, r->triangle_count + p->triangles, &r->triangle_capacity, 3 * sizeof *r->corner);
     for (int64_t i = 0; !r->gltf.status && i < corners; i++) {
         const double at = index.value ? index.value[i] : (double)i;
         if (!(at < p->count))
@@ -195,8 +190,7 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
         FAIL(r, "%s: its mode is %d; triangles, 4, are read, and no strips and fans", owner, (int)mode);
     if (mode >= 0 && mode < DRAPE_GLTF_TRIANGLES)
         return g->status; /* points and lines show no triangles */
-    const drape_gltf_array x =
-        drape_gltf_read(g, owner, attributes, &(drape_gltf_want){"POSITION", NULL, 3, false, -1});
+    const drape_gltf_array x = DRAPE_GLTF_READ(g, owner, attributes, "POSITION", NULL, 3, false, -1);
     if (!x.value)
         return FAIL(r, "%s has no POSITION", owner);
     if (r->point_count + x.count > DRAPE_MAX_NODES)
@@ -211,13 +205,12 @@ static drape_status read_primitive(reader *r, int32_t node, int32_t mesh, const 
              json_array_size(targets), (int)p.targets);
     p.target = drape_gltf_take(&r->gltf, (size_t)p.targets, sizeof *p.target);
     for (int32_t k = 0; !r->gltf.status && k < p.targets; k++)
-        p.target[k] =
-            drape_gltf_read(&r->gltf, owner, json_array_get(targets, (size_t)k),
-                            &(drape_gltf_want){"POSITION", "POSITION of a morph target", 3, false, p.count})
-                .value;
+        p.target[k] = DRAPE_GLTF_READ(&r->gltf, owner, json_array_get(targets, (size_t)k), "POSITION",
+                                      "POSITION of a morph target", 3, false, p.count)
+                          .value;
     if (r->scene.nodes[node].skin >= 0)
         read_influences(r, owner, attributes, &p);
-    r->parts = grow(r, r->parts, r->part_count + 1, &r->part_room, sizeof *r->parts);
+    r->parts = grow(r, r->parts, r->part_count + 1, &r->part_capacity, sizeof *r->parts);
     if (g->status)
         return g->status;
     r->parts[r->part_count++] = p;
@@ -274,7 +267,7 @@ static void place_point(const reader *r, const part *p, size_t point, double *ou
         out[axis] = sum[axis] + 0.0; /* no -0, so that equal points have equal bytes */
 }
 
-/* Whether the map of a part mirrors it; of one with a skin, that of its first point. */
+/* Whether the map of a part mirrors it. A part with a skin has a map for each point; the first one counts. */
 static bool is_mirrored(const reader *r, const part *p)
 {
     const drape_gltf_node *node = &r->scene.nodes[p->node];
@@ -321,16 +314,13 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
         return FAIL(r,
                     "%.0f frames of %.3g points, joints and morph targets are more than %.3g; lower the rate",
                     frames, work, MAX_WORK);
-    drape_status status = drape_mesh_allocate(r->source->ctx, &r->source->file, (size_t)r->point_count,
-                                              (size_t)r->triangle_count, mesh);
-    if (!status)
-        status = drape_sequence_allocate(r->source, mesh, (int64_t)frames, out);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_mesh_allocate(r->source->ctx, &r->source->file, (size_t)r->point_count,
+                                  (size_t)r->triangle_count, mesh));
+    DRAPE_TRY(drape_sequence_allocate(r->source, mesh, (int64_t)frames, out));
     out->first = scene->start * rate;
     out->last = scene->end * rate;
     memcpy(mesh->triangle, r->corner, 3 * (size_t)r->triangle_count * sizeof *mesh->triangle);
-    for (int32_t f = 0; !status && f < out->frame_count; f++) {
+    for (int32_t f = 0; f < out->frame_count; f++) {
         double *x = out->x + 3 * (size_t)f * (size_t)mesh->node_count;
         const double t = fmin(scene->start + f / rate, scene->end);
         drape_gltf_scene_pose(&r->scene, t);
@@ -338,19 +328,18 @@ static drape_status sample(reader *r, drape_mesh *mesh, drape_sequence *out)
             for (int32_t k = 0; k < r->skins[i].count; k++)
                 r->skins[i].now[k] = drape_gltf_map_product(&r->scene.nodes[r->skins[i].joint[k]].world,
                                                             &r->skins[i].inverse[k]);
-        status = drape_check_cancel_after(r->source->ctx, (size_t)work);
-        status = status ? status : check_mirrors(r, f, mesh);
-        for (int64_t k = 0; k < r->part_count && !status; k++)
+        DRAPE_TRY(drape_check_cancel_after(r->source->ctx, (size_t)work));
+        DRAPE_TRY(check_mirrors(r, f, mesh));
+        for (int64_t k = 0; k < r->part_count; k++)
             for (int32_t i = 0; i < r->parts[k].count; i++)
                 place_point(r, &r->parts[k], (size_t)i, x + 3 * (size_t)(r->parts[k].first + i));
         const drape_mesh frame = {.node_count = mesh->node_count, .x = x};
         const char *text = DRAPE_FORMAT("frame %d: ", (int)f);
         const drape_mesh_source source = {
             .pointer = r->source->file.pointer, .file = r->source->file.file, .part = text};
-        if (!status)
-            status = drape_mesh_validate_positions(r->source->ctx, &source, &frame);
+        DRAPE_TRY(drape_mesh_validate_positions(r->source->ctx, &source, &frame));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Points that are one ---- */
@@ -372,17 +361,16 @@ static drape_status find_same(drape_arena *arena, const drape_sequence *frames, 
 {
     const size_t points = (size_t)frames->node_count, count = points * (size_t)frames->frame_count;
     track *tracks = drape_arena_take(arena, points, sizeof *tracks), *first = tracks, *t = tracks;
-    drape_status status = drape_arena_status(arena);
-    for (size_t i = 0; !status && i < points; i++)
+    DRAPE_TRY(drape_arena_status(arena));
+    for (size_t i = 0; i < points; i++)
         tracks[i] = (track){DRAPE_HASH_START, (int32_t)i};
-    for (size_t i = 0; !status && i < count; i++) {
+    for (size_t i = 0; i < count; i++) {
         tracks[i % points].hash =
             drape_hash_bytes(tracks[i % points].hash, frames->x + 3 * i, 3 * sizeof *frames->x);
-        status = drape_check_cancel_after(arena->ctx, 8);
+        DRAPE_TRY(drape_check_cancel_after(arena->ctx, 8));
     }
-    if (!status)
-        qsort(tracks, points, sizeof *tracks, compare_tracks);
-    for (; !status && t < tracks + points; t++) {
+    qsort(tracks, points, sizeof *tracks, compare_tracks);
+    for (; t < tracks + points; t++) {
         bool same = first->hash == t->hash;
         for (int32_t f = 0; same && f < frames->frame_count; f++) {
             const double *x = frames->x + 3 * (size_t)f * points;
@@ -390,17 +378,15 @@ static drape_status find_same(drape_arena *arena, const drape_sequence *frames, 
         }
         first = same ? first : t;
         to[t->point] = first->point;
-        status = drape_check_cancel_after(arena->ctx, (size_t)frames->frame_count);
+        DRAPE_TRY(drape_check_cancel_after(arena->ctx, (size_t)frames->frame_count));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status weld(reader *r, drape_mesh *mesh, drape_sequence *frames)
 {
     int32_t *number = drape_gltf_take(&r->gltf, (size_t)mesh->node_count, sizeof *number);
-    const drape_status status = number ? find_same(r->gltf.arena, frames, number) : r->gltf.status;
-    if (status)
-        return status;
+    DRAPE_TRY(number ? find_same(r->gltf.arena, frames, number) : r->gltf.status);
     /* Triangles that have lost a side, as at the pole of a sphere, are left out. */
     int32_t kept = 0;
     for (int32_t t = 0; t < mesh->triangle_count; t++) {
@@ -443,9 +429,7 @@ static drape_status read_glb(const drape_sequence_source *source, drape_mesh *me
     for (int32_t i = 0; !r.gltf.status && i < count; i++)
         read_skin(&r, i);
     read_parts(&r);
-    drape_status status = r.gltf.status;
-    if (!status)
-        status = sample(&r, mesh, out);
+    drape_status status = r.gltf.status ? r.gltf.status : sample(&r, mesh, out);
     if (!status)
         status = weld(&r, mesh, out);
     drape_gltf_close(&r.gltf);

@@ -11,27 +11,26 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 /* The names of the files, relative to the folder of the source. */
 typedef struct name_list {
-    drape_arena arena;
+    drape_arena *arena;
     char **name;
-    int32_t count, room;
+    int32_t count, capacity;
 } name_list;
 
 static drape_status add_name(name_list *list, const char *name)
 {
-    if (list->count == list->room) {
-        const int32_t room = 2 * list->room + 64;
-        char **more = drape_arena_resize(&list->arena, list->name, (size_t)room, sizeof *more);
+    if (list->count == list->capacity) {
+        const int32_t capacity = 2 * list->capacity + 64;
+        char **more = drape_arena_resize(list->arena, list->name, (size_t)capacity, sizeof *more);
         if (!more)
             return DRAPE_E_MEMORY;
         list->name = more;
-        list->room = room;
+        list->capacity = capacity;
     }
-    list->name[list->count] = drape_arena_text(&list->arena, name);
+    list->name[list->count] = drape_arena_text(list->arena, name);
     return list->name[list->count++] ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -43,7 +42,7 @@ static int compare(const void *a, const void *b)
 static drape_status list_folder(const drape_sequence_source *source, name_list *list)
 {
     drape_status status = DRAPE_OK;
-    const char *path = drape_contents_path(&list->arena, source->folder, source->file.file);
+    const char *path = drape_contents_path(list->arena, source->folder, source->file.file);
     if (!path)
         return DRAPE_E_MEMORY;
     DIR *folder = opendir(path);
@@ -51,10 +50,9 @@ static drape_status list_folder(const drape_sequence_source *source, name_list *
         return drape_fail_at(source->ctx, DRAPE_E_FILE, source->file.pointer, "%s: cannot be read: %s", path,
                              strerror(errno));
     for (const struct dirent *entry; !status && (entry = readdir(folder));) {
-        const size_t length = strlen(entry->d_name);
-        if (length <= 4 || strcasecmp(entry->d_name + length - 4, ".obj") != 0)
+        if (!drape_ends_in(entry->d_name, ".obj"))
             continue;
-        char *name = drape_contents_path(&list->arena, source->file.file, entry->d_name);
+        char *name = drape_contents_path(list->arena, source->file.file, entry->d_name);
         status = name ? add_name(list, name) : DRAPE_E_MEMORY;
     }
     closedir(folder);
@@ -85,7 +83,6 @@ static drape_status list_pattern(const drape_sequence_source *source, name_list 
     const char *pattern = source->file.file, *after;
     size_t before;
     int width;
-    drape_status status = DRAPE_OK;
     if (!strchr(pattern, '%'))
         return add_name(list, pattern);
     if (!split(pattern, &before, &width, &after))
@@ -93,27 +90,27 @@ static drape_status list_pattern(const drape_sequence_source *source, name_list 
                                "a sequence of OBJ files is a folder, with a / at its end, or a pattern with "
                                "one number, such as walk_%%04d.obj");
     const size_t size = strlen(pattern) + 16;
-    char *name = drape_arena_take(&list->arena, size, 1);
-    bool found = true;
-    for (int number = 0; !status && name && found; number++) {
+    char *name = drape_arena_take(list->arena, size, 1);
+    if (!name)
+        return DRAPE_E_MEMORY;
+    for (int number = 0;; number++) {
         snprintf(name, size, "%.*s%0*d%s", (int)before, pattern, width, number, after);
-        const char *path = drape_contents_path(&list->arena, source->folder, name);
+        const char *path = drape_contents_path(list->arena, source->folder, name);
         if (!path)
             return DRAPE_E_MEMORY;
-        found = access(path, F_OK) == 0;
-        status = found ? add_name(list, name) : DRAPE_OK;
-        found = found || number == 0;
+        if (access(path, F_OK) == 0)
+            DRAPE_TRY(add_name(list, name));
+        else if (number > 0)
+            return DRAPE_OK;
     }
-    return name ? status : DRAPE_E_MEMORY;
 }
 
 static drape_status read_frames(const drape_sequence_source *source, const name_list *list, drape_mesh *mesh,
                                 drape_sequence *out)
 {
-    drape_status status =
-        drape_mesh_read(source->ctx, source->file.pointer, source->folder, list->name[0], mesh);
-    if (!status)
-        status = drape_sequence_allocate(source, mesh, list->count, out);
+    drape_status status = DRAPE_OK;
+    DRAPE_TRY(drape_mesh_read(source->ctx, source->file.pointer, source->folder, list->name[0], mesh));
+    DRAPE_TRY(drape_sequence_allocate(source, mesh, list->count, out));
     const size_t numbers = 3 * (size_t)mesh->node_count;
     for (int32_t f = 0; !status && f < list->count; f++) {
         const drape_mesh_source file = {.pointer = source->file.pointer, .file = list->name[f]};
@@ -135,15 +132,11 @@ static drape_status read_frames(const drape_sequence_source *source, const name_
 static drape_status read_obj(const drape_sequence_source *source, drape_mesh *mesh, drape_sequence *out)
 {
     const char *file = source->file.file;
-    name_list list = {.arena = drape_arena_of(source->ctx)};
-    drape_status status =
-        file[strlen(file) - 1] == '/' ? list_folder(source, &list) : list_pattern(source, &list);
-    if (!status && list.count == 0)
-        status = drape_mesh_fail(source->ctx, &source->file, 0, "there are no such OBJ files");
-    if (!status)
-        status = read_frames(source, &list, mesh, out);
-    drape_arena_free(&list.arena);
-    return status;
+    name_list list = {.arena = source->scratch};
+    DRAPE_TRY(file[strlen(file) - 1] == '/' ? list_folder(source, &list) : list_pattern(source, &list));
+    if (list.count == 0)
+        return drape_mesh_fail(source->ctx, &source->file, 0, "there are no such OBJ files");
+    return read_frames(source, &list, mesh, out);
 }
 
 const drape_sequence_ops drape_sequence_obj = {

@@ -35,13 +35,13 @@ static drape_status read_pc2(const drape_sequence_source *source, drape_mesh *me
         return drape_mesh_fail(
             source->ctx, &source->file, 0, "%zu bytes of positions; %u samples of %u points have %llu",
             whole->size - HEADER, samples, points, 12 * (unsigned long long)points * samples);
-    const drape_status status = drape_sequence_allocate(source, mesh, samples, out);
+    DRAPE_TRY(drape_sequence_allocate(source, mesh, samples, out));
     const size_t count = 3 * (size_t)points * samples;
     out->first = first;
     out->step = step;
-    for (size_t i = 0; !status && i < count; i++)
+    for (size_t i = 0; i < count; i++)
         out->x[i] = drape_bytes_float32(data + HEADER + 4 * i);
-    return status;
+    return DRAPE_OK;
 }
 
 const drape_sequence_ops drape_sequence_pc2 = {

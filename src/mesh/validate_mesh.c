@@ -2,6 +2,7 @@
  * divide by zero in a term, make the mass matrix singular, or connect parts that share no edge. */
 #include <math.h>
 
+#include "base/search.h"
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "mesh/remedy.h"
@@ -112,31 +113,18 @@ static drape_status check_duplicates(drape_context *ctx, const drape_mesh_source
 drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh)
 {
-    drape_status status = drape_mesh_validate_indices(ctx, source, mesh);
-    for (int32_t triangle = 0; !status && triangle < mesh->triangle_count; triangle++) {
+    DRAPE_TRY(drape_mesh_validate_indices(ctx, source, mesh));
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         if (n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
-            status = drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice",
-                                     triangle, n[0], n[1], n[2]);
+            return drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice", triangle,
+                                   n[0], n[1], n[2]);
     }
-    if (!status)
-        status = check_shapes(ctx, source, mesh, true);
-    if (!status)
-        status = check_duplicates(ctx, source, mesh);
-    return status;
+    DRAPE_TRY(check_shapes(ctx, source, mesh, true));
+    return check_duplicates(ctx, source, mesh);
 }
 
-/* Union-find over corners (corner 3 t + k is node k of triangle t): the lowest corner represents its set;
- * path halving (Tarjan and van Leeuwen 1984, doi:10.1145/62.2160, section 2). */
-static int32_t find(int32_t *parent, int32_t corner)
-{
-    while (parent[corner] != corner) {
-        parent[corner] = parent[parent[corner]];
-        corner = parent[corner];
-    }
-    return corner;
-}
-
+/* Corner 3 t + k is node k of triangle t. */
 static int32_t corner_at(const drape_mesh *mesh, int32_t triangle, int32_t node)
 {
     const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
@@ -152,10 +140,8 @@ static void join_fans(const drape_mesh *mesh, int32_t *parent)
     for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
         const int32_t *beside = mesh->edge_triangle + 2 * (size_t)edge;
         for (int end = 0; end < 2 && beside[1] >= 0; end++) {
-            const int32_t node = mesh->edge[2 * (size_t)edge + (size_t)end],
-                          a = find(parent, corner_at(mesh, beside[0], node)),
-                          b = find(parent, corner_at(mesh, beside[1], node));
-            parent[a > b ? a : b] = a < b ? a : b;
+            const int32_t node = mesh->edge[2 * (size_t)edge + (size_t)end];
+            drape_set_join(parent, corner_at(mesh, beside[0], node), corner_at(mesh, beside[1], node));
         }
     }
 }

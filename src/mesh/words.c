@@ -7,11 +7,11 @@
 
 #define MAX_SHOWN_WORD 40
 
-drape_text drape_text_open(const char *data, size_t size)
+drape_words drape_words_open(const char *data, size_t size)
 {
     static const char mark[] = "\xEF\xBB\xBF";
     const bool marked = size >= 3 && memcmp(data, mark, 3) == 0;
-    return (drape_text){.at = data + (marked ? 3 : 0), .end = data + size, .line = 1};
+    return (drape_words){.at = data + (marked ? 3 : 0), .end = data + size, .line = 1};
 }
 
 static bool is_blank(char c)
@@ -20,7 +20,7 @@ static bool is_blank(char c)
 }
 
 /* Returns the number of bytes of a line end at this place; 0: there is none. */
-static int line_end(const drape_text *text, const char *at)
+static int line_end(const drape_words *text, const char *at)
 {
     if (at >= text->end)
         return 0;
@@ -30,7 +30,7 @@ static int line_end(const drape_text *text, const char *at)
 }
 
 /* Returns the number of bytes of a backslash and the line end after it; 0: there is none here. */
-static int continued_end(const drape_text *text, const char *at)
+static int continued_end(const drape_words *text, const char *at)
 {
     if (!text->continuation || *at != '\\')
         return 0;
@@ -38,7 +38,7 @@ static int continued_end(const drape_text *text, const char *at)
     return end ? 1 + end : 0;
 }
 
-bool drape_text_next_word(drape_text *text, drape_word *word)
+bool drape_words_next(drape_words *text, drape_word *word)
 {
     for (int continued; text->at < text->end; text->at += continued ? continued : 1) {
         continued = continued_end(text, text->at);
@@ -56,10 +56,10 @@ bool drape_text_next_word(drape_text *text, drape_word *word)
     return word->length > 0;
 }
 
-bool drape_text_next_line(drape_text *text)
+bool drape_words_next_line(drape_words *text)
 {
     drape_word rest;
-    while (drape_text_next_word(text, &rest)) {
+    while (drape_words_next(text, &rest)) {
     }
     while (text->at < text->end && !line_end(text, text->at)) /* skip a comment */
         text->at++;

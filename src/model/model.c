@@ -173,10 +173,8 @@ void drape_model_strain(const drape_model *model, const double *x, double *strai
     for (const int32_t *n = model->triangle; n < model->triangle + 3 * (size_t)model->triangle_count;
          n += 3) {
         double a[3], b[3], normal[3], u[3], v[3], f[2][3];
-        vec3_sub(model->rest + 3 * (size_t)n[1], model->rest + 3 * (size_t)n[0], a);
-        vec3_sub(model->rest + 3 * (size_t)n[2], model->rest + 3 * (size_t)n[0], b);
-        vec3_sub(x + 3 * (size_t)n[1], x + 3 * (size_t)n[0], u);
-        vec3_sub(x + 3 * (size_t)n[2], x + 3 * (size_t)n[0], v);
+        vec3_triangle_sides(n, model->rest, a, b);
+        vec3_triangle_sides(n, x, u, v);
         vec3_cross(a, b, normal);
         /* R = (l, p; 0, h): b is p along the first edge and h across; R^-1 = (1/l, -p/(l h); 0, 1/h). */
         const double l = vec3_norm(a), p = vec3_dot(a, b) / l, h = vec3_norm(normal) / l;

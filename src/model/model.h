@@ -119,6 +119,12 @@ static inline int64_t drape_term_internals(const drape_term *term)
     return each * (term->elements.parts ? term->parts.count : term->elements.count);
 }
 
+/* The internal variables of the term among those of a state, `internal`; NULL if it has none. */
+static inline const double *drape_term_own(const drape_term *term, const double *internal)
+{
+    return term->first_internal >= 0 ? internal + term->first_internal : NULL;
+}
+
 /* The number of the sliders of all its elements. */
 static inline int64_t drape_term_slider_count(const drape_term *term)
 {
@@ -145,7 +151,7 @@ static inline drape_coupling drape_term_patches(const drape_term *term)
     return (drape_coupling){term->patches.count, term->elements.nodes, term->patches.node};
 }
 
-/* The nodes of what is evaluated one by one: the parts or, if there are none, the elements. */
+/* The nodes of the pieces of a term: of its parts or, if it has none, of its elements. */
 static inline drape_coupling drape_term_pieces(const drape_term *term)
 {
     return term->elements.parts ? (drape_coupling){term->parts.count, term->parts.nodes, term->parts.node}
@@ -287,7 +293,7 @@ typedef struct drape_model_untangle {
     bool goes_on; /* a run whose cloth did not come apart */
 } drape_model_untangle;
 
-/* Nodes of one cloth that one item of its "pins" holds. */
+/* One item of the "pins" of a cloth. */
 typedef struct drape_pin {
     char *name;
     int32_t cloth;
@@ -328,7 +334,7 @@ typedef struct drape_model_seam {
     int32_t pair_count;
 } drape_model_seam;
 
-/* What happens at an event, beside that it is recorded and reported. */
+/* What an event does, besides being recorded and reported. */
 typedef enum drape_event_action {
     DRAPE_ACTION_RECORD,
     DRAPE_ACTION_STOP,
@@ -376,9 +382,10 @@ typedef struct drape_part {
 struct drape_model {
     const drape_part *part; /* NULL: it is whole */
     const drape_model
-        *base;         /* the model that this one is with other pins and masses, and whose arrays it shares
+        *base;           /* the model that this one is with other pins and masses, and whose arrays it shares
                                 except those that depend on these; NULL: it is its own */
-    drape_arena arena; /* holds everything below except the meshes */
+    drape_arena arena;   /* holds everything below except the meshes */
+    drape_arena scratch; /* while it is compiled: what a stage needs until it ends; else empty */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
@@ -471,8 +478,9 @@ static inline int32_t drape_model_all_free(const drape_model *model)
  * in that cloth. */
 int32_t drape_model_diagnosed(const drape_model *model, int32_t node, int32_t *number);
 
-/* Nodes that are sewn together count as one where the neighbours of a node are concerned: pieces that have
- * one of these are not in contact, and may pass through each other at the seam. */
+/* The first of the nodes that are sewn together with a node. They count as one node where neighbours are
+ * concerned: pieces that share such a node are not in contact, and may pass through each other at the
+ * seam. */
 static inline int32_t drape_model_sewn(const drape_model *model, int32_t node)
 {
     return model && model->sewn ? model->sewn[node] : node;

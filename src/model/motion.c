@@ -242,8 +242,8 @@ static void meet_kink(kink_search *s, double time)
         s->end = time;
 }
 
-/* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
- * smoothly. Those of a ride are those of its collider, but for its beginning. */
+/* A path begins with a kink unless it continues the motion before it smoothly, and ends with one unless it
+ * comes to rest. A ride has the kinks of its collider, and one where it begins. */
 static void meet_kinks(const course *c, kink_search *s)
 {
     const drape_path *path = c->path;

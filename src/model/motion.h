@@ -157,8 +157,9 @@ void drape_placement_turn(const drape_placement *by, const double x[3], double y
 void drape_motion_place_fixed(const drape_motion *motion, int32_t node, double x[3]);
 
 /* Takes the paths and placements at time t of another motion of the same cloth, in which other nodes may be
- * pinned. before (collider_count): the number that each collider has there; -1: it is new. One that has
- * another pivot, given there or here, is where it would be with the former one. */
+ * pinned. before (collider_count): the number that each collider has there; -1: it is new. A
+ * collider whose pivot has changed, and is given in either scene, is where it would be about the former
+ * pivot. */
 void drape_motion_copy(drape_motion *motion, const drape_motion *from, const int32_t *before, double t);
 
 /* The collider that carries a moved pin; -1: none. */

@@ -10,10 +10,8 @@
 void drape_add_normals(const double *x, const int32_t *triangle, size_t count, double *normals)
 {
     for (const int32_t *node = triangle; node < triangle + 3 * count; node += 3) {
-        double a[3], b[3], m[3];
-        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], a);
-        vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], b);
-        vec3_cross(a, b, m);
+        double m[3];
+        vec3_triangle_area(node, x, m);
         for (int i = 0; i < 3; i++)
             vec3_add_scaled(1, m, normals + 3 * (size_t)node[i]);
     }

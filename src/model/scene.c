@@ -99,23 +99,23 @@ static drape_status cannot_read(drape_scene *scene, const char *why)
 
 /* Reads to the end of the file: the size of a pipe is known only then, and a file may grow while it is
  * read. A device may have no end: after a byte 0, which no scene has, reading ends, too. */
-static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t *size)
+static drape_status read_all(drape_scene *scene, FILE *file, size_t capacity, size_t *size)
 {
     *size = 0;
-    scene->text = drape_alloc(scene->ctx, room + 1, 1);
+    scene->text = drape_alloc(scene->ctx, capacity + 1, 1);
     drape_status status = scene->text ? DRAPE_OK : DRAPE_E_MEMORY;
     for (bool zero = false; !status && !zero && !feof(file);) {
-        if (*size == room) {
-            char *larger = drape_alloc(scene->ctx, 2 * room + 1, 1);
+        if (*size == capacity) {
+            char *larger = drape_alloc(scene->ctx, 2 * capacity + 1, 1);
             if (!larger)
                 return DRAPE_E_MEMORY;
             memcpy(larger, scene->text, *size);
             drape_free(scene->ctx, scene->text);
             scene->text = larger;
-            room *= 2;
+            capacity *= 2;
         }
         errno = 0;
-        const size_t count = fread(scene->text + *size, 1, room - *size, file);
+        const size_t count = fread(scene->text + *size, 1, capacity - *size, file);
         zero = memchr(scene->text + *size, 0, count) != NULL;
         *size += count;
         if (ferror(file))
@@ -137,17 +137,17 @@ static drape_status read_file(drape_scene *scene, const char *path, size_t *size
     if (!file)
         return cannot_read(scene, strerror(errno));
     drape_status status = DRAPE_OK;
-    size_t room = FIRST_READ;
+    size_t capacity = FIRST_READ;
     if (fstat(fileno(file), &info) == 0) {
         if (S_ISDIR(info.st_mode))
             status = cannot_read(scene, "it is a folder");
         else if (S_ISREG(info.st_mode) && info.st_size > (off_t)MAX_FILE)
             status = cannot_read(scene, "it is larger than 1 GiB");
         else if (S_ISREG(info.st_mode))
-            room = (size_t)info.st_size + 1; /* one more, so that the end is detected without growing */
+            capacity = (size_t)info.st_size + 1; /* one more, so that the end is detected without growing */
     }
     if (!status)
-        status = read_all(scene, file, room, size);
+        status = read_all(scene, file, capacity, size);
     fclose(file);
     return status;
 }
@@ -361,7 +361,6 @@ static drape_status parse_value(drape_scene *scene, const char *text, json_t **v
 static drape_status find_child(drape_scene *scene, const char *pointer, const landing *at, json_t **child)
 {
     const bool array = json_is_array(at->container);
-    char given[80], why[120];
     size_t index;
     *child = NULL;
     if (json_is_object(at->container))
@@ -374,12 +373,10 @@ static drape_status find_child(drape_scene *scene, const char *pointer, const la
     *child = json_array_get(at->container, array ? index : 0);
     if (*child)
         return DRAPE_OK;
-    drape_json_describe(at->container, given, sizeof given);
-    if (array)
-        snprintf(why, sizeof why, "is an array of %zu; \"-\" appends", json_array_size(at->container));
-    else
-        snprintf(why, sizeof why, "is %s, not an object or array", given);
-    return cannot_set(scene, pointer, at->path.text, why);
+    return cannot_set(
+        scene, pointer, at->path.text,
+        array ? DRAPE_FORMAT("is an array of %zu; \"-\" appends", json_array_size(at->container))
+              : DRAPE_FORMAT("is %s, not an object or array", DRAPE_JSON_DESCRIBE(at->container)));
 }
 
 /* Follows a non-empty pointer as far as it exists in the tree; changes nothing. */
@@ -390,9 +387,7 @@ static drape_status land(drape_scene *scene, const char *pointer, landing *at)
     do {
         at->container = child;
         at->rest = drape_pointer_next(at->rest, at->key);
-        drape_status status = find_child(scene, pointer, at, &child);
-        if (status)
-            return status;
+        DRAPE_TRY(find_child(scene, pointer, at, &child));
         if (json_is_array(at->container) && strcmp(at->key, "-") == 0)
             drape_pointer_push_index(&at->path, json_array_size(at->container));
         else
@@ -459,21 +454,16 @@ static drape_status set_value(drape_scene *scene, const char *pointer, const cha
     landing at = {.container = NULL};
     override *o = NULL;
     json_t *value = NULL;
-    drape_status status = check_pointer(scene, pointer);
-    if (!status && *pointer)
-        status = land(scene, pointer, &at);
-    for (const char *rest = at.rest;
-         !status && rest && *rest;) { /* keys that do not exist yet are part of the place */
+    DRAPE_TRY(check_pointer(scene, pointer));
+    if (*pointer)
+        DRAPE_TRY(land(scene, pointer, &at));
+    for (const char *rest = at.rest; rest && *rest;) { /* keys that do not exist yet are part of the place */
         char key[DRAPE_POINTER_SIZE];
         rest = drape_pointer_next(rest, key);
         drape_pointer_push(&at.path, strcmp(key, "-") == 0 ? "0" : key);
     }
-    if (!status)
-        status = new_override(scene, at.path.text, pointer, text, &o);
-    if (!status)
-        status = parse_value(scene, text, &value);
-    if (status)
-        return status;
+    DRAPE_TRY(new_override(scene, at.path.text, pointer, text, &o));
+    DRAPE_TRY(parse_value(scene, text, &value));
     if (*pointer) {
         value = wrap(at.rest, value);
         if (!value || put(at.container, at.key, value))
@@ -496,22 +486,17 @@ static drape_status remove_value(drape_scene *scene, const char *pointer)
     landing at = {.container = NULL};
     json_t *value = NULL;
     override *o = NULL;
-    drape_status status = check_pointer(scene, pointer);
-    if (!status && !*pointer)
-        status = drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene cannot be removed");
-    if (!status)
-        status = land(scene, pointer, &at);
-    if (!status)
-        status = find_child(scene, pointer, &at, &value);
-    if (!status && (!value || *at.rest))
-        status = drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot remove %s: there is none", pointer);
-    if (!status && json_is_array(at.container))
-        *strrchr(at.path.text, '/') = 0;
-    if (!status)
-        status = new_override(scene, at.path.text, pointer, NULL, &o);
-    if (status)
-        return status;
     size_t index;
+    DRAPE_TRY(check_pointer(scene, pointer));
+    if (!*pointer)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene cannot be removed");
+    DRAPE_TRY(land(scene, pointer, &at));
+    DRAPE_TRY(find_child(scene, pointer, &at, &value));
+    if (!value || *at.rest)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot remove %s: there is none", pointer);
+    if (json_is_array(at.container))
+        *strrchr(at.path.text, '/') = 0;
+    DRAPE_TRY(new_override(scene, at.path.text, pointer, NULL, &o));
     if (json_is_array(at.container) && drape_pointer_index(at.key, &index))
         json_array_remove(at.container, index);
     else
@@ -566,7 +551,7 @@ drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
     return status;
 }
 
-/* Whether a pointer equals the other one or leads to it. */
+/* Whether a pointer names the same value as the other one, or an object or array around that value. */
 static bool leads_to(const char *pointer, const char *other)
 {
     size_t length = strlen(pointer);

@@ -116,11 +116,13 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
 /* Sets all defaults in the def of an object, including children embedded in it; def must start as zeros. */
 void drape_scene_set_defaults(const drape_scene_object *object, void *def);
 
-/* Describes what a key accepts: "a number in (0, 1e6] s", "an array of objects, at least one". */
-void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size);
+/* Describes what a key accepts: "a number in (0, 1e6] s", "an array of objects, at least one". The macro
+ * makes the text in place, valid until the end of the block. */
+const char *drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size);
+#define DRAPE_KEY_TAKES(key) drape_scene_takes_text(key, (char[DRAPE_RANGE_SIZE]){0}, DRAPE_RANGE_SIZE)
 
 /* Names the keys of which one must be given: "exactly one of grid, file"; "" without such a rule. */
-void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size);
+const char *drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size);
 
 /* Writes the default as text: "60", "required"; "" if there is nothing to say. */
 void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size);

@@ -91,14 +91,10 @@ static drape_status check_object(drape_context *ctx, const object *o, json_t *va
         const drape_param *param = &o->params[i];
         json_t *member = json_object_get(value, param->name);
         drape_pointer_push(&at, param->name);
-        if (!member) {
-            char takes[100];
-            drape_param_takes_text(param, takes, sizeof takes);
-            return drape_refuse(ctx, at.text, "\"%s\" is missing from a CS184 scene: %s", param->name, takes);
-        }
-        drape_status status = drape_json_check(ctx, &at, param, member);
-        if (status)
-            return status;
+        if (!member)
+            return drape_refuse(ctx, at.text, "\"%s\" is missing from a CS184 scene: %s", param->name,
+                                DRAPE_PARAM_TAKES(param));
+        DRAPE_TRY(drape_json_check(ctx, &at, param, member));
         drape_pointer_cut(&at, mark);
     }
     return DRAPE_OK;
@@ -164,19 +160,18 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
 
 static drape_status check(drape_context *ctx, json_t *root)
 {
-    drape_status status = check_keys(ctx, root);
-    for (size_t i = 0; !status && i < OBJECTS; i++) {
+    DRAPE_TRY(check_keys(ctx, root));
+    for (size_t i = 0; i < OBJECTS; i++) {
         json_t *value = json_object_get(root, objects[i].name);
         if (value || objects[i].required)
-            status = check_object(ctx, &objects[i], value);
+            DRAPE_TRY(check_object(ctx, &objects[i], value));
     }
-    if (!status)
-        status = check_pins(ctx, json_object_get(root, "cloth"));
+    DRAPE_TRY(check_pins(ctx, json_object_get(root, "cloth")));
     json_t *normal = json_object_get(json_object_get(root, "plane"), "normal");
     bool has_direction = !normal;
     for (size_t i = 0; i < json_array_size(normal); i++)
         has_direction = has_direction || json_number_value(json_array_get(normal, i)) != 0;
-    return status || has_direction ? status : drape_refuse(ctx, "/plane/normal", "0 0 0 has no direction");
+    return has_direction ? DRAPE_OK : drape_refuse(ctx, "/plane/normal", "0 0 0 has no direction");
 }
 
 /* ---- Our format. NULL means out of memory; jansson's functions accept it as an argument. ---- */

@@ -191,7 +191,7 @@ DEFINE_INIT(periodic)
 
 /* ---- Keys as text ---- */
 
-void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
+const char *drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
 {
     static const char *const shapes[] = {[DRAPE_SCENE_VALUE] = "",
                                          [DRAPE_SCENE_LIST] = "an array, each ",
@@ -206,22 +206,19 @@ void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
                                              "an array of names, or objects with a \"type\""};
     const bool has_values = key->shape == DRAPE_SCENE_VALUE || key->shape == DRAPE_SCENE_LIST;
     const bool has_unit = !has_values && strcmp(key->param.unit, "1") != 0;
-    char value[512] = "", most[32] = "";
-    if (has_values)
-        drape_param_takes_text(&key->param, value, sizeof value);
-    if (key->at_most)
-        snprintf(most, sizeof most, ", at most %zu", key->at_most);
-    snprintf(text, size, "%s%s%s%s%s%s", shapes[key->shape], value, has_unit ? ", in " : "",
-             has_unit ? key->param.unit : "", key->at_least ? ", at least one" : "", most);
+    snprintf(text, size, "%s%s%s%s%s%s", shapes[key->shape], has_values ? DRAPE_PARAM_TAKES(&key->param) : "",
+             has_unit ? ", in " : "", has_unit ? key->param.unit : "", key->at_least ? ", at least one" : "",
+             key->at_most ? DRAPE_FORMAT(", at most %zu", key->at_most) : "");
+    return text;
 }
 
-void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size)
+const char *drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size)
 {
-    size_t used = 0;
-    *text = 0;
-    for (int i = 0; object->one_of && object->one_of[i] && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "exactly one of ",
-                                 object->one_of[i]);
+    snprintf(text, size, "%s%s", object->one_of ? "exactly one of " : "",
+             object->one_of ? object->one_of[0] : "");
+    for (int i = 1; object->one_of && object->one_of[i]; i++)
+        drape_list_add(text, size, object->one_of[i]);
+    return text;
 }
 
 void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size)

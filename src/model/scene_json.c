@@ -9,8 +9,7 @@
 
 #include "model/scene.h"
 
-#define MAX_KEYS  24  /* of one object, for the lists in messages */
-#define MAX_TAKES 600 /* bytes of the description of what a key accepts */
+#define MAX_KEYS 24 /* of one object, for the lists in messages */
 
 typedef struct reader {
     drape_context *ctx;
@@ -25,40 +24,28 @@ static read_function read_value;
 /* ---- Texts for messages ---- */
 
 /* Quotes a string, shortened if it is long. */
-static void quote(const char *string, char *text, size_t size)
+static const char *quote(const char *string, char text[DRAPE_POINTER_SIZE])
 {
     char some[61];
     snprintf(some, sizeof some, "%s", string);
     drape_text_mend_end(some);
-    snprintf(text, size, "\"%s%s\"", some, strlen(some) < strlen(string) ? "..." : "");
+    return drape_format(text, "\"%s%s\"", some, strlen(some) < strlen(string) ? "..." : "");
 }
+#define QUOTED(string) quote(string, (char[DRAPE_POINTER_SIZE]){0})
 
-void drape_json_describe(json_t *value, char *text, size_t size)
+const char *drape_json_describe(json_t *value, char text[DRAPE_POINTER_SIZE])
 {
-    switch (json_typeof(value)) {
-    case JSON_OBJECT:
-        snprintf(text, size, "an object");
-        break;
-    case JSON_ARRAY:
-        if (json_array_size(value) == 0)
-            snprintf(text, size, "an empty array");
-        else
-            snprintf(text, size, "an array of %zu", json_array_size(value));
-        break;
-    case JSON_STRING:
-        quote(json_string_value(value), text, size);
-        break;
-    case JSON_INTEGER:
-    case JSON_REAL:
-        drape_number_text(json_number_value(value), text, size);
-        break;
-    case JSON_TRUE:
-    case JSON_FALSE:
-        snprintf(text, size, "%s", json_is_true(value) ? "true" : "false");
-        break;
-    case JSON_NULL:
-        snprintf(text, size, "null");
-    }
+    if (json_is_string(value))
+        return quote(json_string_value(value), text);
+    if (json_is_number(value))
+        return drape_number_text(json_number_value(value), text);
+    if (json_array_size(value) > 0)
+        return drape_format(text, "an array of %zu", json_array_size(value));
+    return json_is_object(value)  ? "an object"
+           : json_is_array(value) ? "an empty array"
+           : json_is_true(value)  ? "true"
+           : json_is_false(value) ? "false"
+                                  : "null";
 }
 
 /* ---- Faults ---- */
@@ -66,52 +53,32 @@ void drape_json_describe(json_t *value, char *text, size_t size)
 drape_status drape_json_refuse(drape_context *ctx, const drape_pointer *at, json_t *value, const char *what,
                                const char *expected)
 {
-    char given[80];
-    drape_json_describe(value, given, sizeof given);
-    return drape_refuse(ctx, at->text, "%s is not allowed; %s is %s", given, what, expected);
+    return drape_refuse(ctx, at->text, "%s is not allowed; %s is %s", DRAPE_JSON_DESCRIBE(value), what,
+                        expected);
 }
 
 static drape_status refuse(reader *r, const drape_scene_key *key, json_t *value)
 {
-    char expected[MAX_TAKES];
-    drape_scene_takes_text(key, expected, sizeof expected);
-    return drape_json_refuse(r->ctx, &r->at, value, key->param.name, expected);
-}
-
-static drape_status refuse_element(reader *r, size_t index, json_t *value, const char *what,
-                                   const char *expected)
-{
-    drape_pointer_push_index(&r->at, index);
-    return drape_json_refuse(r->ctx, &r->at, value, what, expected);
+    return drape_json_refuse(r->ctx, &r->at, value, key->param.name, DRAPE_KEY_TAKES(key));
 }
 
 static drape_status missing(reader *r, const drape_scene_key *key)
 {
-    char expected[MAX_TAKES];
-    drape_scene_takes_text(key, expected, sizeof expected);
     drape_pointer_push(&r->at, key->param.name);
     return drape_refuse(r->ctx, r->at.text, "\"%s\" is missing: %s; %s", key->param.name, key->param.help,
-                        expected);
-}
-
-/* "a, b, c" */
-static void list_names(const char *const *names, size_t count, char *text, size_t size)
-{
-    size_t used = 0;
-    *text = 0;
-    for (size_t i = 0; i < count && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", names[i]);
+                        DRAPE_KEY_TAKES(key));
 }
 
 static drape_status unknown_key(reader *r, const drape_scene_object *object, const char *name)
 {
     const char *known[MAX_KEYS];
     size_t count = 0;
-    for (; count < object->key_count && count < MAX_KEYS; count++)
+    const char *given = QUOTED(name);
+    char list[300] = "";
+    for (; count < object->key_count && count < MAX_KEYS; count++) {
         known[count] = object->keys[count].param.name;
-    char given[80], list[300];
-    quote(name, given, sizeof given);
-    list_names(known, count, list, sizeof list);
+        drape_list_add(list, sizeof list, known[count]);
+    }
     const char *meant = drape_did_you_mean(name, known, count);
     drape_pointer_push(&r->at, name);
     if (meant)
@@ -132,10 +99,9 @@ static drape_status read_version(reader *r, const drape_scene_key *key, json_t *
         return refuse(r, key, value);
     if (json_number_value(value) == DRAPE_SCENE_FORM)
         return DRAPE_OK;
-    char given[40];
-    drape_number_text(json_number_value(value), given, sizeof given);
     return drape_fail_at(r->ctx, DRAPE_E_VERSION, r->at.text,
-                         "a scene of version %s; this library reads version %d", given, DRAPE_SCENE_FORM);
+                         "a scene of version %s; this library reads version %d",
+                         DRAPE_NUMBER_TEXT(json_number_value(value)), DRAPE_SCENE_FORM);
 }
 
 static drape_status read_remark(reader *r, const drape_scene_key *key, json_t *value, char *def)
@@ -144,24 +110,48 @@ static drape_status read_remark(reader *r, const drape_scene_key *key, json_t *v
     return json_is_string(value) ? DRAPE_OK : refuse(r, key, value);
 }
 
-/* Reads the elements of an array, as many as out has room for. */
-static drape_status read_numbers(reader *r, json_t *array, double *out)
+/* Reads the elements of an array, each as if it were the value of a key, to places `size` bytes apart. */
+static drape_status read_each(reader *r, read_function *read, const drape_scene_key *key, json_t *array,
+                              void *out, size_t size)
 {
+    const size_t mark = r->at.length;
     for (size_t i = 0; i < json_array_size(array); i++) {
-        json_t *one = json_array_get(array, i);
-        if (!json_is_number(one))
-            return refuse_element(r, i, one, "an element", "a number");
-        out[i] = json_number_value(one);
+        drape_pointer_push_index(&r->at, i);
+        DRAPE_TRY(read(r, key, json_array_get(array, i), (char *)out + i * size));
+        drape_pointer_cut(&r->at, mark);
     }
     return DRAPE_OK;
 }
 
-/* Reads three numbers inside another array; `what` is their name in messages. */
-static drape_status read_three(reader *r, json_t *value, const char *what, double *out)
+static drape_status read_number(reader *r, const drape_scene_key *key, json_t *value, char *out)
+{
+    (void)key;
+    if (!json_is_number(value))
+        return drape_json_refuse(r->ctx, &r->at, value, "an element", "a number");
+    const double number = json_number_value(value);
+    memcpy(out, &number, sizeof number);
+    return DRAPE_OK;
+}
+
+static drape_status read_numbers(reader *r, json_t *array, double *out)
+{
+    return read_each(r, read_number, NULL, array, out, sizeof *out);
+}
+
+static drape_status read_pair(reader *r, const drape_scene_key *key, json_t *value, char *out)
+{
+    (void)key;
+    return json_array_size(value) == 2
+               ? read_each(r, read_number, NULL, value, out, sizeof(double))
+               : drape_json_refuse(r->ctx, &r->at, value, "an element", "an array of two numbers");
+}
+
+/* Reads three numbers inside another array, which messages call by the name of the key. */
+static drape_status read_three(reader *r, const drape_scene_key *key, json_t *value, char *out)
 {
     return json_array_size(value) == 3
-               ? read_numbers(r, value, out)
-               : drape_json_refuse(r->ctx, &r->at, value, what, "three numbers, [x, y, z]");
+               ? read_each(r, read_number, NULL, value, out, sizeof(double))
+               : drape_json_refuse(r->ctx, &r->at, value, key->param.name, "three numbers, [x, y, z]");
 }
 
 /* Booleans become texts, so that no parameter mistakes them for numbers. */
@@ -183,38 +173,23 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
     out->vector_count = (pairs ? 2 : 1) * json_array_size(value);
     if (!numbers)
         return DRAPE_E_MEMORY;
-    if (!pairs)
-        return read_numbers(r, value, numbers);
-    const size_t mark = r->at.length;
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < json_array_size(value); i++) {
-        json_t *one = json_array_get(value, i);
-        drape_pointer_push_index(&r->at, i);
-        status = json_array_size(one) == 2
-                     ? read_numbers(r, one, numbers + 2 * i)
-                     : drape_json_refuse(r->ctx, &r->at, one, "an element", "an array of two numbers");
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
-    }
-    return status;
+    return pairs ? read_each(r, read_pair, NULL, value, numbers, 2 * sizeof *numbers)
+                 : read_numbers(r, value, numbers);
 }
 
 static drape_status read_param(reader *r, const drape_param *param, json_t *value, drape_setting *setting,
                                double *values)
 {
-    char given[80];
     /* drape_param_value checks the rest */
     const bool writable = json_is_array(value)
                               ? drape_param_width(param) > 1 || param->kind == DRAPE_PARAM_POINTS
                           : json_is_boolean(value) ? param->kind == DRAPE_PARAM_BOOLEAN
                           : json_is_string(value)  ? param->kind != DRAPE_PARAM_BOOLEAN
                                                    : json_is_number(value);
-    if (!writable) {
-        drape_json_describe(value, given, sizeof given);
-        return drape_param_refuse(r->ctx, r->at.text, param, given);
-    }
-    drape_status status = read_setting(r, param->name, value, setting);
-    return status ? status : drape_param_value(r->ctx, r->at.text, param, setting, values);
+    if (!writable)
+        return drape_param_refuse(r->ctx, r->at.text, param, DRAPE_JSON_DESCRIBE(value));
+    DRAPE_TRY(read_setting(r, param->name, value, setting));
+    return drape_param_value(r->ctx, r->at.text, param, setting, values);
 }
 
 drape_status drape_json_check(drape_context *ctx, const drape_pointer *at, const drape_param *param,
@@ -233,26 +208,19 @@ static drape_status read_one(reader *r, const drape_scene_key *key, json_t *valu
 {
     drape_setting setting;
     double values[DRAPE_PARAM_WIDEST];
-    drape_status status = read_param(r, &key->param, value, &setting, values);
-    if (!status)
-        drape_scene_store(key, &setting, values, def);
-    return status;
+    DRAPE_TRY(read_param(r, &key->param, value, &setting, values));
+    drape_scene_store(key, &setting, values, def);
+    return DRAPE_OK;
 }
 
 static drape_status read_box(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
     const bool given = true;
+    const drape_scene_key corner = {.param = {.name = "a corner"}};
     double low_high[6];
     if (json_array_size(value) != 2)
         return refuse(r, key, value);
-    size_t mark = r->at.length;
-    for (size_t i = 0; i < 2; i++) {
-        drape_pointer_push_index(&r->at, i);
-        drape_status status = read_three(r, json_array_get(value, i), "a corner", low_high + 3 * i);
-        if (status)
-            return status;
-        drape_pointer_cut(&r->at, mark);
-    }
+    DRAPE_TRY(read_each(r, read_three, &corner, value, low_high, sizeof low_high / 2));
     memcpy(def + key->offset, low_high, sizeof low_high);
     memcpy(def + key->count_offset, &given, sizeof given);
     return DRAPE_OK;
@@ -263,12 +231,12 @@ static drape_status read_quaternion(reader *r, const drape_scene_key *key, json_
     double q[4];
     if (json_array_size(value) != 4)
         return refuse(r, key, value);
-    const drape_status status = read_numbers(r, value, q);
-    if (!status && q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
+    DRAPE_TRY(read_numbers(r, value, q));
+    if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0)
         return drape_json_refuse(r->ctx, &r->at, value, key->param.name,
                                  "four numbers, [w, x, y, z], not all of them 0");
     memcpy(def + key->offset, q, sizeof q);
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Arrays ---- */
@@ -296,18 +264,11 @@ static drape_status read_list(reader *r, const drape_scene_key *key, json_t *val
     const size_t size = key->param.kind == DRAPE_PARAM_INTEGER  ? sizeof(int32_t)
                         : key->param.kind == DRAPE_PARAM_NUMBER ? sizeof(double)
                                                                 : sizeof(const char *);
-    const size_t mark = r->at.length;
     drape_scene_key element = {.param = key->param};
     element.param.name = "an element";
-    char *elements = NULL;
-    drape_status status = take_array(r, key, value, size, def, &elements);
-    for (size_t i = 0; !status && i < json_array_size(value); i++) {
-        drape_pointer_push_index(&r->at, i);
-        status = read_one(r, &element, json_array_get(value, i), elements + i * size);
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
-    }
-    return status;
+    void *elements = NULL;
+    DRAPE_TRY(take_array(r, key, value, size, def, &elements));
+    return read_each(r, read_one, &element, value, elements, size);
 }
 
 static drape_status read_track_key(reader *r, json_t *value, const drape_track_key *before,
@@ -315,31 +276,30 @@ static drape_status read_track_key(reader *r, json_t *value, const drape_track_k
 {
     if (json_array_size(value) != 2)
         return drape_json_refuse(r->ctx, &r->at, value, "a key of a track", "[time, [x, y, z]]");
+    const drape_scene_key displacement = {.param = {.name = "a displacement"}};
     json_t *time = json_array_get(value, 0);
-    if (!json_is_number(time))
-        return refuse_element(r, 0, time, "the time of a key", "a number");
     out->time = json_number_value(time);
-    if (before && !(out->time > before->time)) {
-        char expected[100] = "greater than that of the key before, ";
-        drape_number_text(before->time, expected + strlen(expected), 40);
-        return refuse_element(r, 0, time, "the time of a key", expected);
-    }
-    drape_pointer_push_index(&r->at, 1);
-    return read_three(r, json_array_get(value, 1), "a displacement", out->displacement);
+    const char *expected =
+        !json_is_number(time) ? "a number"
+        : before && !(out->time > before->time)
+            ? DRAPE_FORMAT("greater than that of the key before, %s", DRAPE_NUMBER_TEXT(before->time))
+            : NULL;
+    drape_pointer_push_index(&r->at, expected ? 0 : 1);
+    return expected ? drape_json_refuse(r->ctx, &r->at, time, "the time of a key", expected)
+                    : read_three(r, &displacement, json_array_get(value, 1), (char *)out->displacement);
 }
 
 static drape_status read_track(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
     drape_track_key *keys = NULL;
-    drape_status status = take_array(r, key, value, sizeof *keys, def, &keys);
-    size_t mark = r->at.length;
-    for (size_t i = 0; !status && i < json_array_size(value); i++) {
+    DRAPE_TRY(take_array(r, key, value, sizeof *keys, def, &keys));
+    const size_t mark = r->at.length;
+    for (size_t i = 0; i < json_array_size(value); i++) {
         drape_pointer_push_index(&r->at, i);
-        status = read_track_key(r, json_array_get(value, i), i ? &keys[i - 1] : NULL, &keys[i]);
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
+        DRAPE_TRY(read_track_key(r, json_array_get(value, i), i ? &keys[i - 1] : NULL, &keys[i]));
+        drape_pointer_cut(&r->at, mark);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Objects ---- */
@@ -366,9 +326,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
         if (json_is_object(member) || json_is_null(member))
             return drape_json_refuse(r->ctx, &r->at, member, "a setting",
                                      "a number, true, false, a string or an array of numbers or pairs");
-        const drape_status status = read_setting(r, name, member, &settings[count++]);
-        if (status)
-            return status;
+        DRAPE_TRY(read_setting(r, name, member, &settings[count++]));
         drape_pointer_cut(&r->at, mark);
     }
     if (open) { /* an object without settings differs from a missing object */
@@ -380,28 +338,26 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
 
 static drape_status check_one_of(reader *r, const drape_scene_object *object, json_t *value)
 {
-    const char *given[MAX_KEYS];
     size_t count = 0, given_count = 0;
+    char wanted[200], given[200] = "";
     for (; object->one_of && object->one_of[count]; count++)
-        if (json_object_get(value, object->one_of[count]))
-            given[given_count++] = object->one_of[count];
+        if (json_object_get(value, object->one_of[count])) {
+            drape_list_add(given, sizeof given, object->one_of[count]);
+            given_count++;
+        }
     if (count == 0 || given_count == 1)
         return DRAPE_OK;
-    char wanted[200], found[200] = "none";
-    drape_scene_one_of_text(object, wanted, sizeof wanted);
-    if (given_count)
-        list_names(given, given_count, found, sizeof found);
-    return drape_refuse(r->ctx, r->at.text, "%s is needed; given: %s", wanted, found);
+    return drape_refuse(r->ctx, r->at.text, "%s is needed; given: %s",
+                        drape_scene_one_of_text(object, wanted, sizeof wanted), *given ? given : "none");
 }
 
 /* Unknown keys are reported first: a missing key may be there under a misspelled name. */
 static drape_status read_object(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
-    drape_status status = read_others(r, object, value, def);
-    if (!status)
-        status = check_one_of(r, object, value);
+    DRAPE_TRY(read_others(r, object, value, def));
+    DRAPE_TRY(check_one_of(r, object, value));
     const size_t mark = r->at.length;
-    for (size_t i = 0; !status && i < object->key_count; i++) {
+    for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         json_t *member = json_object_get(value, key->param.name);
         if (!member && drape_param_is_required(&key->param))
@@ -409,11 +365,10 @@ static drape_status read_object(reader *r, const drape_scene_object *object, jso
         if (!member)
             continue;
         drape_pointer_push(&r->at, key->param.name);
-        status = read_value(r, key, member, def);
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
+        DRAPE_TRY(read_value(r, key, member, def));
+        drape_pointer_cut(&r->at, mark);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status read_child(reader *r, const drape_scene_key *key, json_t *value, char *def)
@@ -436,16 +391,9 @@ static drape_status read_element(reader *r, const drape_scene_key *key, json_t *
 
 static drape_status read_children(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    char *children = NULL;
-    drape_status status = take_array(r, key, value, key->child->def_size, def, &children);
-    size_t mark = r->at.length;
-    for (size_t i = 0; !status && i < json_array_size(value); i++) {
-        drape_pointer_push_index(&r->at, i);
-        status = read_element(r, key, json_array_get(value, i), children + i * key->child->def_size);
-        if (!status)
-            drape_pointer_cut(&r->at, mark);
-    }
-    return status;
+    void *children = NULL;
+    DRAPE_TRY(take_array(r, key, value, key->child->def_size, def, &children));
+    return read_each(r, read_element, key, value, children, key->child->def_size);
 }
 
 static drape_status read_value(reader *r, const drape_scene_key *key, json_t *value, char *def)
@@ -471,12 +419,10 @@ static drape_status check_names(reader *r, const drape_scene_def *def)
         const char *own = DRAPE_FORMAT("cloth%zu", i);
         const char *name = def->cloths[i].name ? def->cloths[i].name : own;
         if (json_object_get(names, name)) {
-            char given[80];
-            quote(name, given, sizeof given);
             drape_pointer_push(&r->at, "cloth");
             drape_pointer_push_index(&r->at, i);
             drape_pointer_push(&r->at, "name");
-            status = drape_refuse(r->ctx, r->at.text, "%s is the name of another cloth", given);
+            status = drape_refuse(r->ctx, r->at.text, "%s is the name of another cloth", QUOTED(name));
         } else if (json_object_set_new(names, name, json_true())) {
             status = drape_fail_memory(r->ctx, strlen(name));
         }
@@ -496,12 +442,8 @@ drape_status drape_scene_read(drape_context *ctx, drape_arena *arena, json_t *ro
     if (!version)
         return missing(&r, key);
     drape_pointer_push(&r.at, key->param.name);
-    drape_status status = read_value(&r, key, version, NULL);
-    if (!status)
-        drape_pointer_cut(&r.at, 0);
-    if (!status)
-        status = read_object(&r, &drape_form_scene, root, (char *)def);
-    if (!status)
-        status = check_names(&r, def);
-    return status;
+    DRAPE_TRY(read_value(&r, key, version, NULL));
+    drape_pointer_cut(&r.at, 0);
+    DRAPE_TRY(read_object(&r, &drape_form_scene, root, (char *)def));
+    return check_names(&r, def);
 }

@@ -23,7 +23,8 @@ drape_status drape_json_refuse(drape_context *ctx, const drape_pointer *at, json
                                const char *expected);
 
 /* Describes a value briefly, for messages: -1, "be", an array of 2, an object. */
-void drape_json_describe(json_t *value, char *text, size_t size);
+const char *drape_json_describe(json_t *value, char text[DRAPE_POINTER_SIZE]);
+#define DRAPE_JSON_DESCRIBE(value) drape_json_describe(value, (char[DRAPE_POINTER_SIZE]){0})
 
 /* Whether the tree of a scene has the form of CS184: "cloth" is one object, and there is no "drape" key. */
 bool drape_scene_is_cs184(json_t *root);

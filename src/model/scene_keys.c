@@ -52,7 +52,7 @@ static const char *const up_axes[] = {"y", "z", NULL};
     }
 static const char *const selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
-/* The motion that pins and colliders have, and the names of all that has one. */
+/* The keys of motions, which pins and colliders have, and the key of names. */
 #define MOTION_KEYS(def)                                                                                     \
     {DRAPE_VECTOR("track", "s and m", NONE, LOWEST, HIGHEST,                                                 \
                   "displacement from the position at the start, or that its parameters define, linear "      \

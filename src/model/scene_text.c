@@ -12,9 +12,9 @@
 
 static void push_text(drape_pointer *pointer, const char *text)
 {
-    size_t room = sizeof pointer->text - pointer->length;
-    int wanted = snprintf(pointer->text + pointer->length, room, "%s", text);
-    pointer->length += (size_t)wanted < room ? (size_t)wanted : room - 1;
+    size_t space = sizeof pointer->text - pointer->length;
+    int wanted = snprintf(pointer->text + pointer->length, space, "%s", text);
+    pointer->length += (size_t)wanted < space ? (size_t)wanted : space - 1;
 }
 
 void drape_pointer_push(drape_pointer *pointer, const char *key)

@@ -91,7 +91,7 @@ static void shorten_path(drape_path *path, const drape_sent_part *part)
     const double span = path->t[1] - path->t[0];
     double move[3], rest[3];
     vec3_sub(path->x[1], path->x[0], move);
-    /* Whether a path is at constant speed: velocities that a host gave are its own. */
+    /* Whether a path is at constant speed: else the host gave its velocities, which are kept. */
     double off[3] = {-move[0], -move[1], -move[2]};
     vec3_add_scaled(span, path->v[0], off);
     const bool steady = memcmp(path->v[0], path->v[1], sizeof path->v[0]) == 0 &&

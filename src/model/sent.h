@@ -7,8 +7,8 @@
 
 #include "model/motion.h"
 
-/* Of what is sent at time t and ends no later than `end`: the displacement that all have in common [m], and
- * which share of the rest is done. */
+/* How much of the motions is done that were sent at time t and end no later than `end`: what is `common` to
+ * all of them, but for `left`, and a share of the rest. */
 typedef struct drape_sent_part {
     double t, end;    /* [s] */
     double common[3]; /* [m] */
@@ -16,8 +16,8 @@ typedef struct drape_sent_part {
     double share;     /* of the rest, from 0 to 1 */
 } drape_sent_part;
 
-/* Whether a collider is sent so, anything is, or all pinned nodes are: by themselves or with a collider that
- * carries them. */
+/* Whether a host has sent at time t, to be there no later than `end`: a collider; anything; all pinned nodes,
+ * by themselves or with a collider that carries them. */
 bool drape_motion_sends_collider(const drape_motion *motion, int32_t collider, double t, double end);
 bool drape_motion_sends(const drape_motion *motion, double t, double end);
 bool drape_motion_sends_pins(const drape_motion *motion, double t, double end);
@@ -28,7 +28,7 @@ bool drape_motion_sends_pins(const drape_motion *motion, double t, double end);
 bool drape_motion_moves_as_one(const drape_motion *motion, int32_t first, int32_t count, const double *x,
                                double end, double common[3]);
 
-/* Leaves of all that is sent so only that part. Where it begins does not change. */
+/* Shortens the motions that were sent at part->t to that part of them. They begin where they did. */
 void drape_motion_shorten(drape_motion *motion, const drape_sent_part *part);
 
 #endif

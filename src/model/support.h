@@ -34,21 +34,21 @@ double drape_supports_power(const drape_motion *motion, const double *g, double 
 /* The kinetic energy along the directions that moving supports hold, which only they change [J]. */
 double drape_supports_kinetic(const drape_motion *motion, const double *v);
 
-/* Takes what lies along the directions that are held out of vectors at all nodes (node_count x 3), or at
- * the free nodes (free_count x 3). Placed cloth has its directions turned with it. */
+/* Removes the components along held directions from vectors at all nodes (node_count x 3), or at the free
+ * nodes (free_count x 3). Where a host has placed the cloth elsewhere, these directions turn with it. */
 void drape_supports_project(const drape_motion *motion, double *nodes);
 void drape_supports_project_free(const drape_motion *motion, double *free_nodes);
 
-/* Takes what lies along the directions that are held out of velocities that come from elsewhere, but not from
- * those that a step left there: `before` is the motion and v0 the velocities (node_count x 3) up to now.
- * Where the same directions are held as before, moving supports keep theirs, those at rest that of v0. */
+/* Removes the components along held directions from velocities v (node_count x 3) that no step has left
+ * there; `before` is the motion, and v0 are the velocities, up to now. Where the same directions were held
+ * before, moving supports keep their velocities, and supports at rest the component that v0 has. */
 void drape_supports_stop(const drape_motion *motion, const drape_motion *before, const double *v0, double *v);
 
 /* values: of a matrix over the free nodes. */
 void drape_supports_project_matrix(const drape_motion *motion, const drape_pattern *pattern, double *values);
 
-/* The forces of the supports, and those by which periodic edges hold each other: g (node_count x 3) without
- * it, and 0 where a node is free in all directions; pinned nodes are unchanged. */
+/* Reduces g (node_count x 3) to the forces of the supports and those by which periodic edges hold each other:
+ * 0 where a node is free in all directions. Pinned nodes keep g. */
 void drape_supports_keep_reactions(const drape_motion *motion, double *g);
 
 /* Makes the displacement from x0 to x along these directions that of the supports from t0 to t1: takes out
