@@ -1,6 +1,6 @@
 /* build_colliders.c: colliders by name, with their parameters, shapes, tracks and rotations. */
-#include "colliders/colliders.h"
 #include "base/def.h"
+#include "colliders/colliders.h"
 #include "compile/stages.h"
 
 #include <math.h>
@@ -47,26 +47,22 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     int kind = 0;
     const char *pointer = DRAPE_FORMAT("/colliders/%zu", i);
     const char *type = DRAPE_FORMAT("%s/type", pointer);
-    drape_status status = drape_compile_name(model, pointer, "collider", "colliders", def->name, (int32_t)i,
-                                             &to->name, sizeof *to);
+    DRAPE_TRY(drape_compile_name(model, pointer, "collider", "colliders", def->name, (int32_t)i, &to->name,
+                                 sizeof *to));
     to->index = (int32_t)i;
     to->friction = def->friction;
     to->restitution = def->restitution;
-    if (!status)
-        status = drape_registry_choose(model->ctx, &drape_collider_registry, type, def->entry.type, &kind);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_registry_choose(model->ctx, &drape_collider_registry, type, def->entry.type, &kind));
     const int built_in = drape_registry_count(&drape_collider_registry);
     to->ops = kind < built_in ? drape_colliders[kind] : &model->ctx->host_colliders[kind - built_in];
-    status = drape_compile_choice(model, &def->entry, "", &to->choice);
-    if (!status && def->key_count > 0)
-        status = drape_compile_track(model, pointer, def->track, def->key_count, &to->track);
-    if (!status && def->turn_count > 0)
-        status = drape_compile_turns(model, pointer, def->turns, def->turn_count, &to->turns);
-    if (!status)
-        status = drape_collider_build(model->ctx, &model->arena, pointer, scene->folder,
-                                      SHARE_OF_DISTANCE * model->contact.distance, to);
-    return status ? status : set_pivot(model, pointer, def->pivot, to);
+    DRAPE_TRY(drape_compile_choice(model, &def->entry, "", &to->choice));
+    if (def->key_count > 0)
+        DRAPE_TRY(drape_compile_track(model, pointer, def->track, def->key_count, &to->track));
+    if (def->turn_count > 0)
+        DRAPE_TRY(drape_compile_turns(model, pointer, def->turns, def->turn_count, &to->turns));
+    DRAPE_TRY(drape_collider_build(model->ctx, &model->arena, pointer, scene->folder,
+                                   SHARE_OF_DISTANCE * model->contact.distance, to));
+    return set_pivot(model, pointer, def->pivot, to);
 }
 
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def)
@@ -86,6 +82,24 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     return status;
 }
 
+drape_status drape_compile_take_ops(drape_context *ctx, const char *what, const void *given, size_t least,
+                                    void *own, size_t size)
+{
+    size_t bytes;
+    if (!ctx)
+        return DRAPE_E_ARGUMENT;
+    if (!given)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_%s: there are no ops", what);
+    memcpy(&bytes, given, sizeof bytes); /* struct_size is the first member */
+    if (!drape_def_fits(bytes, least, size))
+        return drape_fail(
+            ctx, DRAPE_E_VERSION,
+            "the ops of a %s have %zu bytes; this library's have %zu, an older one's %zu or more", what,
+            bytes, size, least);
+    memcpy(own, given, bytes);
+    return DRAPE_OK;
+}
+
 /* The size of the function table in its first version: `smooth` may be missing, and cloth then meets the
  * collider through its triangles. */
 #define MIN_SIZE offsetof(drape_collider_ops, smooth)
@@ -93,16 +107,7 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)
 {
     drape_collider_ops own = {0}, *ops = &own;
-    if (!ctx)
-        return DRAPE_E_ARGUMENT;
-    if (!given)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_collider: there are no ops");
-    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof own))
-        return drape_fail(
-            ctx, DRAPE_E_VERSION,
-            "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, MIN_SIZE);
-    memcpy(&own, given, given->struct_size);
+    DRAPE_TRY(drape_compile_take_ops(ctx, "collider", given, MIN_SIZE, &own, sizeof own));
     if (!ops->entry.name || !ops->entry.summary || !ops->entry.reference || !ops->shape || !ops->distance ||
         !drape_params_are_well_formed(ops->entry.params, ops->entry.param_count))
         return drape_fail(

@@ -224,17 +224,13 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
                                     {.settings = def->untangle, .setting_count = def->untangle_count}};
     drape_choice *const choices[] = {&model->contact_choice, &model->self_choice, &model->untangle_choice};
     double all[3][DRAPE_MAX_PARAMS];
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < 3; i++) {
+    for (int i = 0; i < 3; i++) {
         const char *pointer = DRAPE_FORMAT("/%s", names[i]);
         if (i == 0 || defs[i].settings) /* the others are off unless they are given */
-            status = drape_params_resolve(model->ctx, pointer, registries[i]->entries[0], defs[i].settings,
-                                          defs[i].setting_count, all[i]);
-        if (!status)
-            status = drape_compile_choice(model, &defs[i], names[i], choices[i]);
+            DRAPE_TRY(drape_params_resolve(model->ctx, pointer, registries[i]->entries[0], defs[i].settings,
+                                           defs[i].setting_count, all[i]));
+        DRAPE_TRY(drape_compile_choice(model, &defs[i], names[i], choices[i]));
     }
-    if (status)
-        return status;
     drape_contact_def *contact = &model->contact;
     const double *values = all[0], distance = values[DRAPE_CONTACT_DISTANCE];
     contact->distance_given = !isnan(distance);

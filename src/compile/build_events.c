@@ -1,10 +1,9 @@
 /* build_events.c: events by name, with their parameters, cloths and pins. */
-#include "events/events.h"
 #include "compile/compile.h"
 #include "compile/stages.h"
+#include "events/events.h"
 #include "model/scene.h"
 
-#include <stdio.h>
 #include <string.h>
 
 /* An event under construction: of a scene, or of a host whose sim has a model already. */
@@ -68,12 +67,11 @@ static drape_status choose(const place *p, const char *key, const char *text, in
     const drape_setting setting = {.name = key, .text = text};
     double value = 0;
     const char *at = DRAPE_FORMAT("%s/%s", p->pointer, key);
-    const drape_status status =
-        text ? drape_param_value(p->ctx, at, &drape_scene_key_of(&drape_form_event, key)->param, &setting,
-                                 &value)
-             : DRAPE_OK;
+    if (text)
+        DRAPE_TRY(drape_param_value(p->ctx, at, &drape_scene_key_of(&drape_form_event, key)->param, &setting,
+                                    &value));
     *out = (int)value;
-    return status;
+    return DRAPE_OK;
 }
 
 /* The rest shapes of clamped edges contain the directions in which they are held. */
@@ -95,9 +93,8 @@ static drape_status check_release(const place *p, const drape_model_event *to)
 static drape_status resolve(const place *p, const drape_event_def *def, drape_model_event *to)
 {
     int direction = 0, action = 0;
-    drape_status status = choose(p, "direction", def->direction, &direction);
-    if (!status)
-        status = choose(p, "action", def->action, &action);
+    DRAPE_TRY(choose(p, "direction", def->direction, &direction));
+    DRAPE_TRY(choose(p, "action", def->action, &action));
     to->direction = (drape_event_direction)direction;
     to->action = (drape_event_action)action;
     to->once = def->once;
@@ -105,11 +102,10 @@ static drape_status resolve(const place *p, const drape_event_def *def, drape_mo
     for (int32_t c = 0; def->cloth && c < p->model->cloth_count; c++)
         if (strcmp(p->model->cloths[c].name, def->cloth) == 0)
             to->cloth = c;
-    if (!status && def->cloth && to->cloth < 0)
-        status = drape_fail_below(p->ctx, p->pointer, "cloth", "there is no cloth \"%.60s\"", def->cloth);
-    if (!status)
-        status = find_pins(p, def->pins, to);
-    return status || to->action != DRAPE_ACTION_RELEASE ? status : check_release(p, to);
+    if (def->cloth && to->cloth < 0)
+        return drape_fail_below(p->ctx, p->pointer, "cloth", "there is no cloth \"%.60s\"", def->cloth);
+    DRAPE_TRY(find_pins(p, def->pins, to));
+    return to->action != DRAPE_ACTION_RELEASE ? DRAPE_OK : check_release(p, to);
 }
 
 /* In the column of events of steps.csv, "a@0.1;b@0.2", a name ends at "@" and an event at ";". */
@@ -128,29 +124,21 @@ static drape_status check_name(const place *p, const char *name)
 static drape_status compile_event(drape_model *model, size_t i, const drape_event_def *def)
 {
     drape_model_event *to = &model->events[i];
-    char pointer[64];
     int function = 0;
+    const char *pointer = DRAPE_FORMAT("/events/%zu", i), *type = DRAPE_FORMAT("%s/type", pointer);
     const place p = {.ctx = model->ctx, .arena = &model->arena, .model = model, .pointer = pointer};
-    snprintf(pointer, sizeof pointer, "/events/%zu", i);
-    const char *type = DRAPE_FORMAT("%s/type", pointer);
-    drape_status status =
-        drape_compile_name(model, pointer, "event", "events", def->name, (int32_t)i, &to->name, sizeof *to);
-    if (!status)
-        status = check_name(&p, to->name);
-    if (!status)
-        status = resolve(&p, def, to);
-    if (!status)
-        status = drape_registry_choose(p.ctx, &drape_event_registry, type, def->entry.type, &function);
-    if (status)
-        return status;
+    DRAPE_TRY(
+        drape_compile_name(model, pointer, "event", "events", def->name, (int32_t)i, &to->name, sizeof *to));
+    DRAPE_TRY(check_name(&p, to->name));
+    DRAPE_TRY(resolve(&p, def, to));
+    DRAPE_TRY(drape_registry_choose(p.ctx, &drape_event_registry, type, def->entry.type, &function));
     to->ops = drape_events[function];
-    status = drape_compile_choice(model, &def->entry, "", &to->choice);
-    if (!status)
-        status = drape_params_resolve(p.ctx, pointer, &to->ops->entry, def->entry.settings,
-                                      def->entry.setting_count, to->values);
-    if (!status && to->ops->needs_pins && to->pinned_count == 0)
-        status = drape_fail_below(p.ctx, pointer, "type", "the event is about pins, and there are none");
-    return status || !to->ops->check ? status : to->ops->check(p.ctx, pointer, model, to);
+    DRAPE_TRY(drape_compile_choice(model, &def->entry, "", &to->choice));
+    DRAPE_TRY(drape_params_resolve(p.ctx, pointer, &to->ops->entry, def->entry.settings,
+                                   def->entry.setting_count, to->values));
+    if (to->ops->needs_pins && to->pinned_count == 0)
+        return drape_fail_below(p.ctx, pointer, "type", "the event is about pins, and there are none");
+    return !to->ops->check ? DRAPE_OK : to->ops->check(p.ctx, pointer, model, to);
 }
 
 drape_status drape_compile_events(drape_model *model, const drape_scene_def *def)
@@ -175,8 +163,7 @@ drape_status drape_compile_host_event(drape_context *ctx, drape_arena *arena, co
     const place p = {.ctx = ctx, .arena = arena, .model = model, .pointer = "/event"};
     *to = (drape_model_event){.ops = NULL};
     to->name = drape_arena_text(arena, def->name);
-    drape_status status = drape_arena_status(arena);
-    if (!status)
-        status = check_name(&p, def->name);
-    return status ? status : resolve(&p, def, to);
+    DRAPE_TRY(drape_arena_status(arena));
+    DRAPE_TRY(check_name(&p, def->name));
+    return resolve(&p, def, to);
 }

@@ -41,7 +41,7 @@ static drape_status check(drape_model *model, const char *pointer, const drape_s
     return DRAPE_OK;
 }
 
-/* Adds a history of so many keys to the model, which has room for it. */
+/* Adds a history of so many keys to the model, which has memory for one more. */
 static drape_status add(drape_model *model, const char *name, size_t count, const double *times,
                         const double *values, bool cubic)
 {
@@ -64,20 +64,20 @@ static drape_status add(drape_model *model, const char *name, size_t count, cons
 
 drape_status drape_compile_histories(drape_model *model, const drape_scene_def *def)
 {
-    size_t room = def->history_count;
+    size_t capacity = def->history_count;
     for (size_t c = 0; c < def->cloth_count; c++)
-        room += def->cloths[c].term_count;
-    model->histories = drape_arena_take(&model->arena, room, sizeof *model->histories);
-    drape_status status = model->histories ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (size_t i = 0; !status && i < def->history_count; i++) {
+        capacity += def->cloths[c].term_count;
+    model->histories = drape_arena_take(&model->arena, capacity, sizeof *model->histories);
+    if (!model->histories)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < def->history_count; i++) {
         const drape_history_def *from = &def->histories[i];
         const char *pointer = DRAPE_FORMAT("/histories/%zu", i);
-        status = check(model, pointer, def, i);
-        if (!status)
-            status = add(model, from->name, from->time_count, from->times, from->values,
-                         from->interpolation && strcmp(from->interpolation, "cubic") == 0);
+        DRAPE_TRY(check(model, pointer, def, i));
+        DRAPE_TRY(add(model, from->name, from->time_count, from->times, from->values,
+                      from->interpolation && strcmp(from->interpolation, "cubic") == 0));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status refuse_timed(drape_model *model, const char *pointer, const drape_term *term)

@@ -28,7 +28,6 @@ static drape_status ignore(drape_model *model, int32_t cloth, const char *pointe
 drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *def)
 {
     const int32_t rows = model->collider_count + model->cloth_count;
-    drape_status status = DRAPE_OK;
     bool any = false;
     for (size_t c = 0; c < def->cloth_count; c++)
         any = any || def->cloths[c].ignore_count > 0;
@@ -48,9 +47,9 @@ drape_status drape_compile_ignored(drape_model *model, const drape_scene_def *de
         memset(model->ignored + c * model->cloth_count, !def->colliders[c].enabled,
                (size_t)model->cloth_count);
     for (int32_t c = 0; c < model->cloth_count; c++)
-        for (size_t i = 0; !status && i < def->cloths[c].ignore_count; i++) {
+        for (size_t i = 0; i < def->cloths[c].ignore_count; i++) {
             const char *pointer = DRAPE_FORMAT("/cloth/%d/ignore/%zu", (int)c, i);
-            status = ignore(model, c, pointer, def->cloths[c].ignore[i]);
+            DRAPE_TRY(ignore(model, c, pointer, def->cloths[c].ignore[i]));
         }
-    return status;
+    return DRAPE_OK;
 }

@@ -26,31 +26,27 @@ drape_status drape_compile_masses(drape_model *model, const char *pointer, const
                                   drape_cloth *cloth)
 {
     const size_t count = (size_t)cloth->mesh.node_count;
-    drape_status status = DRAPE_OK;
     if (def->mass_count == 0)
         return DRAPE_OK;
     cloth->node_mass = drape_arena_take(&model->arena, count, sizeof *cloth->node_mass);
-    mass_item item = {.mass = cloth->node_mass, .taken = drape_alloc(model->ctx, count, 1)};
+    mass_item item = {.mass = cloth->node_mass, .taken = drape_arena_take(&model->scratch, count, 1)};
     if (!item.mass || !item.taken)
-        status = DRAPE_E_MEMORY;
-    else
-        memcpy(item.mass, cloth->material_mass, count * sizeof *item.mass);
-    for (size_t i = 0; !status && i < def->mass_count; i++) {
+        return DRAPE_E_MEMORY;
+    memcpy(item.mass, cloth->material_mass, count * sizeof *item.mass);
+    for (size_t i = 0; i < def->mass_count; i++) {
         const char *at = DRAPE_FORMAT("%s/masses/%zu", pointer, i);
         item.def = &def->masses[i];
         memset(item.taken, 0, count);
         if (isnan(item.def->add) == isnan(item.def->mass))
-            status = drape_refuse(model->ctx, at, "exactly one of add, mass is needed; given: %s",
-                                  isnan(item.def->add) ? "none" : "both");
-        else
-            status = drape_select_nodes(&(drape_selection){.ctx = model->ctx,
-                                                           .pointer = at,
-                                                           .form = &drape_form_mass,
-                                                           .mesh = &cloth->mesh,
-                                                           DRAPE_SELECTED_BY(item.def),
-                                                           .take = take_node,
-                                                           .user = &item});
+            return drape_refuse(model->ctx, at, "exactly one of add, mass is needed; given: %s",
+                                isnan(item.def->add) ? "none" : "both");
+        DRAPE_TRY(drape_select_nodes(&(drape_selection){.ctx = model->ctx,
+                                                        .pointer = at,
+                                                        .form = &drape_form_mass,
+                                                        .mesh = &cloth->mesh,
+                                                        DRAPE_SELECTED_BY(item.def),
+                                                        .take = take_node,
+                                                        .user = &item}));
     }
-    drape_free(model->ctx, item.taken);
-    return status;
+    return DRAPE_OK;
 }

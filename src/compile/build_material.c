@@ -161,27 +161,20 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
 {
     double values[PARAM_COUNT], mass = 0;
     const char *at = DRAPE_FORMAT("%s/material", pointer);
-    drape_status status = drape_params_resolve(model->ctx, at, &drape_material_entry, def->material,
-                                               def->material_count, values);
+    DRAPE_TRY(drape_params_resolve(model->ctx, at, &drape_material_entry, def->material, def->material_count,
+                                   values));
     double area = 0;
     for (int32_t t = 0; t < cloth->mesh.triangle_count; t++)
         area += cloth->mesh.triangle_area[t];
-    if (!status)
-        status = check_stiffness(model->ctx, at, values);
-    if (!status)
-        status = total_mass(model->ctx, at, values, area, &mass);
-    if (!status)
-        status = take_curves(model, def, cloth);
-    if (status)
-        return status;
+    DRAPE_TRY(check_stiffness(model->ctx, at, values));
+    DRAPE_TRY(total_mass(model->ctx, at, values, area, &mass));
+    DRAPE_TRY(take_curves(model, def, cloth));
     int32_t count = cloth->mesh.node_count;
     cloth->material_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->material_mass);
     cloth->node_mass = cloth->material_mass;
     if (!cloth->material_mass)
         return DRAPE_E_MEMORY;
-    status = take_fabric(model, def, values, cloth);
-    if (status)
-        return status;
+    DRAPE_TRY(take_fabric(model, def, values, cloth));
     memcpy(cloth->material_values, values, sizeof values);
     const bool measured = cloth->bending.warp > 0;
     drape_material m = {.bending_warp = measured ? cloth->bending.warp : NAN,

@@ -2,6 +2,7 @@
  * the scene leaves them so. See model/periodic.h. */
 #include "model/periodic.h"
 
+#include "base/search.h"
 #include "base/vec3.h"
 #include "compile/select.h"
 #include "compile/stages.h"
@@ -18,7 +19,7 @@
 
 /* One edge of a pair. */
 typedef struct side {
-    int32_t *node; /* (count) local to the cloth; room for all its nodes */
+    int32_t *node; /* (count) local to the cloth; memory for all its nodes */
     int32_t count;
     uint8_t *taken; /* (nodes of the cloth) */
     double mean[3]; /* [m] at rest */
@@ -53,9 +54,9 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     return DRAPE_OK;
 }
 
-static drape_status list_side(const pairing *p, const char *key, const drape_selection_def *def,
-                              drape_arena *scratch, side *s)
+static drape_status list_side(const pairing *p, const char *key, const drape_selection_def *def, side *s)
 {
+    drape_arena *scratch = &p->model->scratch;
     const drape_mesh *mesh = &p->cloth->mesh;
     const char *pointer = DRAPE_FORMAT("%s/%s", p->pointer, key);
     s->node = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *s->node);
@@ -67,12 +68,11 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
                                        DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = s};
-    drape_status status = drape_arena_status(scratch);
-    if (!status)
-        status = drape_select_nodes(&selection);
-    for (int32_t i = 0; !status && i < s->count; i++)
+    DRAPE_TRY(drape_arena_status(scratch));
+    DRAPE_TRY(drape_select_nodes(&selection));
+    for (int32_t i = 0; i < s->count; i++)
         vec3_add_scaled(1.0 / s->count, mesh->x + 3 * (size_t)s->node[i], s->mean);
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status refuse_pair(const pairing *p, int32_t node, const double *at)
@@ -89,10 +89,11 @@ static drape_status refuse_pair(const pairing *p, int32_t node, const double *at
         (int)node, at[0], at[1], at[2], (int)nearest, distance(x + 3 * (size_t)nearest, at));
 }
 
-/* Finds the node of `to` that lies where each of `from` is displaced to at rest: among those, in the order of
- * one coordinate, whose coordinate is near. */
-static drape_status match(pairing *p, drape_arena *scratch)
+/* Finds the partner of each node of `from`: the node of `to` at its place plus the displacement at rest.
+ * Nodes of `to` are sorted by one coordinate, so that only near ones are compared. */
+static drape_status match(pairing *p)
 {
+    drape_arena *scratch = &p->model->scratch;
     const double *x = p->cloth->mesh.x, slip = SLIP * p->model->length;
     const size_t count = (size_t)p->to.count;
     double extent[3] = {0};
@@ -102,13 +103,11 @@ static drape_status match(pairing *p, drape_arena *scratch)
     const size_t flat = extent[1] > extent[0], axis = extent[2] > extent[flat] ? 2 : flat;
     drape_node_along *list = drape_arena_take(scratch, count, sizeof *list);
     p->partner = drape_arena_take(scratch, count, sizeof *p->partner);
-    drape_status status = drape_arena_status(scratch);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_arena_status(scratch));
     for (size_t i = 0; i < count; i++)
         list[i] = (drape_node_along){x[3 * (size_t)p->to.node[i] + axis], p->to.node[i]};
     qsort(list, count, sizeof *list, drape_compare_along);
-    for (size_t i = 0; !status && i < count; i++) {
+    for (size_t i = 0; i < count; i++) {
         double at[3];
         size_t low = 0, high = count;
         for (size_t k = 0; k < 3; k++)
@@ -127,17 +126,17 @@ static drape_status match(pairing *p, drape_arena *scratch)
             return refuse_pair(p, p->from.node[i], at);
         p->partner[i] = list[low].node;
         p->to.taken[list[low].node] = 0; /* each is the partner of one */
-        status = drape_check_cancel_after(p->model->ctx, count);
+        DRAPE_TRY(drape_check_cancel_after(p->model->ctx, count));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* Nodes inside the mesh are not on an edge that another one continues. */
-static drape_status check_boundary(const pairing *p, drape_arena *scratch)
+static drape_status check_boundary(const pairing *p)
 {
     const drape_mesh *mesh = &p->cloth->mesh;
     const side *const sides[2] = {&p->from, &p->to};
-    uint8_t *outer = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *outer);
+    uint8_t *outer = drape_arena_take(&p->model->scratch, (size_t)mesh->node_count, sizeof *outer);
     if (!outer)
         return DRAPE_E_MEMORY;
     for (size_t e = 0; e < (size_t)mesh->edge_count; e++)
@@ -152,13 +151,10 @@ static drape_status check_boundary(const pairing *p, drape_arena *scratch)
     return DRAPE_OK;
 }
 
-static drape_status find_pairs(pairing *p, drape_arena *scratch)
+static drape_status find_pairs(pairing *p)
 {
-    drape_status status = list_side(p, "from", &p->def->from, scratch, &p->from);
-    if (!status)
-        status = list_side(p, "to", &p->def->to, scratch, &p->to);
-    if (status)
-        return status;
+    DRAPE_TRY(list_side(p, "from", &p->def->from, &p->from));
+    DRAPE_TRY(list_side(p, "to", &p->def->to, &p->to));
     for (int32_t i = 0; i < p->from.count; i++)
         if (p->to.taken[p->from.node[i]])
             return drape_refuse(p->model->ctx, p->pointer, "node %d is in both edges", (int)p->from.node[i]);
@@ -166,8 +162,8 @@ static drape_status find_pairs(pairing *p, drape_arena *scratch)
         return drape_refuse(p->model->ctx, p->pointer,
                             "one edge has %d nodes and the other %d: they are paired one by one",
                             (int)p->from.count, (int)p->to.count);
-    status = check_boundary(p, scratch);
-    return status ? status : match(p, scratch);
+    DRAPE_TRY(check_boundary(p));
+    return match(p);
 }
 
 /* ---- The start ---- */
@@ -235,22 +231,15 @@ static drape_status place(pairing *p, bool may_move)
             return DRAPE_E_MEMORY;
         model->start = memcpy(start, model->rest, count * sizeof *start);
     }
-    drape_status status = stretch(p, now, model->start + first);
-    for (int32_t i = 0; !status && i < p->from.count; i++)
+    DRAPE_TRY(stretch(p, now, model->start + first));
+    for (int32_t i = 0; i < p->from.count; i++)
         for (size_t k = 0; k < 3; k++)
             model->start[first + 3 * (size_t)p->partner[i] + k] =
                 model->start[first + 3 * (size_t)p->from.node[i] + k] + p->def->period[k];
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Sets of images ---- */
-
-static int32_t root_of(int32_t *parent, int32_t node)
-{
-    while (parent[node] != node)
-        node = parent[node] = parent[parent[node]];
-    return node;
-}
 
 /* parent (node_count): a tree of each set, whose root is its first node. */
 static drape_status list_sets(drape_model *m, int32_t *parent)
@@ -262,7 +251,7 @@ static drape_status list_sets(drape_model *m, int32_t *parent)
     for (int32_t i = 0; i < m->node_count; i++)
         m->image_set[i] = -1;
     for (int32_t i = 0; i < m->node_count; i++) {
-        int32_t *set = &m->image_set[root_of(parent, i)];
+        int32_t *set = &m->image_set[drape_set_of(parent, i)];
         if (parent[i] == i)
             continue;
         members += 1 + (*set < 0);
@@ -287,11 +276,11 @@ static drape_status list_sets(drape_model *m, int32_t *parent)
     return DRAPE_OK;
 }
 
-/* Notes which edges of triangles are the same one: those between paired nodes, each beside one triangle. */
-static drape_status pair_mesh_edges(const pairing *p, int32_t *image, drape_arena *scratch)
+/* Finds the image of each edge of the boundary: the edge between the partners of its nodes. */
+static drape_status pair_mesh_edges(const pairing *p, int32_t *image)
 {
     const drape_mesh *mesh = &p->cloth->mesh;
-    int32_t *partner = drape_arena_take(scratch, (size_t)mesh->node_count, sizeof *partner);
+    int32_t *partner = drape_arena_take(&p->model->scratch, (size_t)mesh->node_count, sizeof *partner);
     if (!partner)
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < mesh->node_count; i++)
@@ -314,57 +303,46 @@ static drape_status pair_mesh_edges(const pairing *p, int32_t *image, drape_aren
 static drape_status pair_edges(drape_model *model, size_t c, size_t i, const drape_periodic_def *def,
                                int32_t *parent)
 {
-    drape_arena scratch = drape_arena_of(model->ctx);
     const int32_t first = model->cloths[c].first_node;
     pairing p = {.model = model, .cloth = &model->cloths[c], .def = def};
     snprintf(p.pointer, sizeof p.pointer, "/cloth/%zu/periodic/%zu", c, i);
-    drape_status status = find_pairs(&p, &scratch);
-    if (!status)
-        status = place(&p, parent != NULL);
-    for (int32_t k = 0; parent && !status && k < p.from.count; k++) {
-        const int32_t a = root_of(parent, first + p.from.node[k]), b = root_of(parent, first + p.partner[k]);
-        parent[a > b ? a : b] = a < b ? a : b;
-    }
-    if (parent && !status)
-        status = pair_mesh_edges(&p, model->cloths[c].edge_image, &scratch);
-    drape_arena_free(&scratch);
-    return status;
+    DRAPE_TRY(find_pairs(&p));
+    DRAPE_TRY(place(&p, parent != NULL));
+    if (!parent)
+        return DRAPE_OK;
+    for (int32_t k = 0; k < p.from.count; k++)
+        drape_set_join(parent, first + p.from.node[k], first + p.partner[k]);
+    return pair_mesh_edges(&p, model->cloths[c].edge_image);
 }
 
 drape_status drape_compile_periodic(drape_model *model, const drape_scene_def *def)
 {
-    drape_status status = DRAPE_OK;
     size_t count = 0;
     for (size_t c = 0; c < def->cloth_count; c++)
         count += def->cloths[c].periodic_count;
     if (count == 0)
         return DRAPE_OK;
-    int32_t *parent = drape_alloc(model->ctx, (size_t)model->node_count, sizeof *parent);
+    int32_t *parent = drape_arena_take(&model->scratch, (size_t)model->node_count, sizeof *parent);
     if (!parent)
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < model->node_count; i++)
         parent[i] = i;
-    for (size_t c = 0; !status && c < def->cloth_count; c++) {
+    for (size_t c = 0; c < def->cloth_count; c++) {
         drape_cloth *cloth = &model->cloths[c];
         const size_t edges = (size_t)cloth->mesh.edge_count;
         if (def->cloths[c].periodic_count == 0)
             continue;
         cloth->edge_image = drape_arena_take(&model->arena, edges, sizeof *cloth->edge_image);
-        for (size_t e = 0; cloth->edge_image && e < edges; e++)
+        if (!cloth->edge_image)
+            return DRAPE_E_MEMORY;
+        for (size_t e = 0; e < edges; e++)
             cloth->edge_image[e] = -1;
-        status = cloth->edge_image ? DRAPE_OK : DRAPE_E_MEMORY;
     }
-    for (size_t c = 0; c < def->cloth_count; c++)
-        for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
-            status = pair_edges(model, c, i, &def->cloths[c].periodic[i], parent);
-    for (size_t c = 0; c < def->cloth_count; c++)
-        for (size_t i = 0; !status && i < def->cloths[c].periodic_count; i++)
-            status = pair_edges(model, c, i, &def->cloths[c].periodic[i], NULL);
-    if (!status)
-        status = list_sets(model, parent);
-    drape_free(model->ctx, parent);
-    if (status)
-        return status;
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t c = 0; c < def->cloth_count; c++)
+            for (size_t i = 0; i < def->cloths[c].periodic_count; i++)
+                DRAPE_TRY(pair_edges(model, c, i, &def->cloths[c].periodic[i], pass == 0 ? parent : NULL));
+    DRAPE_TRY(list_sets(model, parent));
     drape_periodic_share(model, model->mass);
     for (int32_t c = 0; c < model->cloth_count; c++)
         model->cloths[c].node_mass = model->mass + model->cloths[c].first_node;
@@ -451,22 +429,22 @@ static bool move_alike(const drape_model *m, const int32_t *track_of, int32_t a,
     return alike;
 }
 
-static drape_status check_motions(const drape_model *m)
+static drape_status check_motions(drape_model *m)
 {
-    int32_t *track_of = drape_alloc(m->ctx, (size_t)m->node_count, sizeof *track_of);
-    drape_status status = track_of ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (int32_t i = 0; track_of && i < m->node_count; i++)
+    int32_t *track_of = drape_arena_take(&m->scratch, (size_t)m->node_count, sizeof *track_of);
+    if (!track_of)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < m->node_count; i++)
         track_of[i] = -1;
-    for (int32_t i = 0; track_of && i < m->moved_count; i++)
+    for (int32_t i = 0; i < m->moved_count; i++)
         track_of[m->moved_node[i]] = m->moved_track[i];
-    for (int32_t s = 0; !status && s < m->image_set_count; s++)
-        for (int32_t k = m->image_start[s] + 1; !status && k < m->image_start[s + 1]; k++) {
+    for (int32_t s = 0; s < m->image_set_count; s++)
+        for (int32_t k = m->image_start[s] + 1; k < m->image_start[s + 1]; k++) {
             const int32_t a = m->image[m->image_start[s]], b = m->image[k];
             if (m->pinned[a] && !move_alike(m, track_of, a, b))
-                status = refuse_nodes(m, a, b, "pins move them differently");
+                return refuse_nodes(m, a, b, "pins move them differently");
         }
-    drape_free(m->ctx, track_of);
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status check_clamps(const drape_model *m)
@@ -512,17 +490,17 @@ static int compare_keys(const void *a, const void *b)
     return (p > q) - (p < q);
 }
 
-/* Whether elements of two nodes lie along both edges of a pair, which are one edge: they would count twice.
- * (Those of triangles do not: each is on one side.) A cloth of one or two cells between its edges may be
- * refused for other elements between the same nodes. */
-static drape_status find_twins(const drape_model *m, const drape_term *term, bool *found)
+/* Whether elements of two nodes lie along both edges of a pair. The two edges are one, so such elements would
+ * count twice; elements of triangles, which are beside one edge each, do not. A cloth of one or two cells
+ * between its periodic edges may be refused for elements across it, which join images of the same nodes. */
+static drape_status find_twins(drape_model *m, const drape_term *term, bool *found)
 {
     const drape_elements *el = &term->elements;
     int32_t count = 0;
     *found = false;
     if (el->nodes != 2 || el->count == 0 || term->ops->constraint)
         return DRAPE_OK;
-    int64_t *key = drape_alloc(m->ctx, (size_t)el->count, sizeof *key); /* the sets of both nodes */
+    int64_t *key = drape_arena_take(&m->scratch, (size_t)el->count, sizeof *key); /* the sets of both nodes */
     if (!key)
         return DRAPE_E_MEMORY;
     for (int32_t e = 0; e < el->count; e++) {
@@ -534,7 +512,6 @@ static drape_status find_twins(const drape_model *m, const drape_term *term, boo
     qsort(key, (size_t)count, sizeof *key, compare_keys);
     for (int32_t i = 1; i < count; i++)
         *found = *found || key[i] == key[i - 1];
-    drape_free(m->ctx, key);
     return DRAPE_OK;
 }
 
@@ -553,26 +530,24 @@ static bool is_periodic(const drape_model *m, const drape_cloth *cloth)
     return false;
 }
 
-static drape_status check_terms(const drape_model *m)
+static drape_status check_terms(drape_model *m)
 {
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < m->term_count; i++) {
+    for (int32_t i = 0; i < m->term_count; i++) {
         const drape_term *term = &m->terms[i];
         bool twins;
         if (term->seam >= 0 || term->ops->law || term->ops->external || term->ops->periodic ||
             !is_periodic(m, &m->cloths[term->cloth]))
             continue;
-        status = find_twins(m, term, &twins);
-        if (!status && twins)
-            status =
-                refuse_cloth(m, term->cloth, term->ops->entry.name,
-                             "has elements along both edges, which are one edge: they would count twice");
-        if (!status && reaches_over_edges(m, term))
-            status = refuse_cloth(
+        DRAPE_TRY(find_twins(m, term, &twins));
+        if (twins)
+            return refuse_cloth(m, term->cloth, term->ops->entry.name,
+                                "has elements along both edges, which are one edge: they would count twice");
+        if (reaches_over_edges(m, term))
+            return refuse_cloth(
                 m, term->cloth, term->ops->entry.name,
                 "couples nodes across edges of triangles, but would not across the periodic edge");
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Couplings ---- */
@@ -619,22 +594,18 @@ static int64_t visit_couplings(const drape_model *m, const drape_coupling *coupl
 
 static drape_status couple_images(drape_model *m)
 {
-    drape_coupling *couplings = drape_alloc(m->ctx, (size_t)m->term_count + 2, sizeof *couplings);
+    drape_coupling *couplings = drape_arena_take(&m->scratch, (size_t)m->term_count + 2, sizeof *couplings);
     if (!couplings)
         return DRAPE_E_MEMORY;
     const int count = drape_model_couplings(m, NULL, couplings);
     const int64_t pairs = visit_couplings(m, couplings, count, NULL);
-    drape_status status = DRAPE_OK;
     if (pairs > INT32_MAX)
-        status = drape_refuse(m->ctx, "/cloth", "periodic edges have too many nodes");
-    else
-        m->image_coupled = drape_arena_take(&m->arena, 2 * (size_t)pairs, sizeof *m->image_coupled);
-    if (!status && !m->image_coupled)
-        status = DRAPE_E_MEMORY;
-    if (!status)
-        m->image_coupled_count = (int32_t)visit_couplings(m, couplings, count, m->image_coupled);
-    drape_free(m->ctx, couplings);
-    return status;
+        return drape_refuse(m->ctx, "/cloth", "periodic edges have too many nodes");
+    m->image_coupled = drape_arena_take(&m->arena, 2 * (size_t)pairs, sizeof *m->image_coupled);
+    if (!m->image_coupled)
+        return DRAPE_E_MEMORY;
+    m->image_coupled_count = (int32_t)visit_couplings(m, couplings, count, m->image_coupled);
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_images(drape_model *m, const drape_scene_def *def)
@@ -642,18 +613,14 @@ drape_status drape_compile_images(drape_model *m, const drape_scene_def *def)
     (void)def;
     if (m->image_set_count == 0)
         return DRAPE_OK;
-    drape_status status = drape_compile_pinned_images(m);
-    if (!status)
-        status = check_supports(m);
-    if (!status)
-        status = check_motions(m);
-    if (!status)
-        status = check_clamps(m);
-    for (int32_t c = 0; !status && m->contact.self && c < m->cloth_count; c++)
+    DRAPE_TRY(drape_compile_pinned_images(m));
+    DRAPE_TRY(check_supports(m));
+    DRAPE_TRY(check_motions(m));
+    DRAPE_TRY(check_clamps(m));
+    for (int32_t c = 0; m->contact.self && c < m->cloth_count; c++)
         if (is_periodic(m, &m->cloths[c]))
-            status = refuse_cloth(m, c, "cloth with periodic edges",
-                                  "has no self_contact: it would not touch its images");
-    if (!status)
-        status = check_terms(m);
-    return status ? status : couple_images(m);
+            return refuse_cloth(m, c, "cloth with periodic edges",
+                                "has no self_contact: it would not touch its images");
+    DRAPE_TRY(check_terms(m));
+    return couple_images(m);
 }

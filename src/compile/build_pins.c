@@ -136,8 +136,8 @@ static drape_status refuse_motions(const drape_model *model, const char *at, int
 
 /* ---- Nodes of pins ---- */
 
-/* Adds what of a direction the others of a node do not hold already: planes that meet at a node leave it a
- * line, and three of them nothing. If all of it is held already, its pins must move alike along it. */
+/* Adds the part of a direction that the node's other directions do not hold: two planes that meet at a node
+ * leave it a line, three leave it nothing. If they hold all of it, their pins must move alike along it. */
 static drape_status add_direction(const pin_place *pin, const char *key, int32_t node,
                                   const double *direction, int32_t track)
 {
@@ -167,14 +167,14 @@ static drape_status take_node(void *user, const char *key, int32_t local)
 {
     pin_place *pin = user;
     int32_t node = pin->cloth->first_node + local;
-    drape_status status = drape_check_cancel_after(pin->model->ctx, 8);
+    DRAPE_TRY(drape_check_cancel_after(pin->model->ctx, 8));
     if (pin->count > 0) {
-        for (int i = 0; !status && i < pin->count && !pin->held[node]; i++)
-            status =
-                add_direction(pin, key, node, pin->direction[i], pin->def->key_count > 0 ? pin->track : -1);
+        for (int i = 0; i < pin->count && !pin->held[node]; i++)
+            DRAPE_TRY(
+                add_direction(pin, key, node, pin->direction[i], pin->def->key_count > 0 ? pin->track : -1));
         pin->clamped[node] |= pin->def->clamp;
         pin->held[node] = 1;
-        return status;
+        return DRAPE_OK;
     }
     if (pin->model->pinned[node] && !tracks_agree(pin->model, pin->track_of_node[node], pin->track))
         return drape_fail_below(pin->model->ctx, pin->pointer, key,
@@ -184,7 +184,7 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     pin->model->pinned[node] = 1;
     pin->clamped[node] |= pin->def->clamp;
     pin->held[node] = 1;
-    return status;
+    return DRAPE_OK;
 }
 
 /* A vector of the scene, of length 1; false if it is not given. */
@@ -252,12 +252,12 @@ static drape_status keep_track(pin_place *pin)
         return DRAPE_OK;
     pin->track = model->track_count++;
     drape_track *to = &model->tracks[pin->track];
-    drape_status status = DRAPE_OK;
     if (pin->def->key_count > 0)
-        status = drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count, to);
-    if (!status && pin->def->turn_count > 0)
-        status = drape_compile_turns(model, pin->pointer, pin->def->turns, pin->def->turn_count, &to->turns);
-    return status;
+        DRAPE_TRY(drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count, to));
+    if (pin->def->turn_count > 0)
+        DRAPE_TRY(
+            drape_compile_turns(model, pin->pointer, pin->def->turns, pin->def->turn_count, &to->turns));
+    return DRAPE_OK;
 }
 
 /* Lists the nodes that the pin holds, and clears their marks for the next pin. */
@@ -279,35 +279,30 @@ static drape_status list_nodes(const pin_place *pin, drape_pin *to)
 
 static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, int32_t c, pin_place *pin)
 {
-    drape_status status = DRAPE_OK;
-    for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++) {
+    for (size_t p = 0; p < def->cloths[c].pin_count; p++) {
         drape_pin *to = &model->pins[model->pin_count++];
         to->cloth = c;
         to->clamps = def->cloths[c].pins[p].clamp;
         pin->cloth = &model->cloths[c];
         pin->def = &def->cloths[c].pins[p];
         snprintf(pin->pointer, sizeof pin->pointer, "/cloth/%d/pins/%zu", (int)c, p);
-        status = drape_compile_name(model, pin->pointer, "pin", "pins of the cloth", pin->def->name,
-                                    (int32_t)p, &to->name, sizeof *to);
-        if (!status)
-            status = find_directions(pin);
+        DRAPE_TRY(drape_compile_name(model, pin->pointer, "pin", "pins of the cloth", pin->def->name,
+                                     (int32_t)p, &to->name, sizeof *to));
+        DRAPE_TRY(find_directions(pin));
         to->slides = pin->count > 0;
-        if (!status)
-            status = keep_track(pin);
+        DRAPE_TRY(keep_track(pin));
         to->turn = to->clamps && pin->def->turn_count > 0 ? pin->track : -1;
-        if (!status && to->turn >= 0)
+        if (to->turn >= 0)
             model->tracks[to->turn].clamps = true;
-        if (!status)
-            status = drape_select_nodes(&(drape_selection){.ctx = model->ctx,
-                                                           .pointer = pin->pointer,
-                                                           .form = &drape_form_pin,
-                                                           .mesh = &pin->cloth->mesh,
-                                                           DRAPE_SELECTED_BY(pin->def),
-                                                           .take = take_node,
-                                                           .user = pin});
-        if (!status)
-            status = list_nodes(pin, to);
-        if (status || pin->track < 0)
+        DRAPE_TRY(drape_select_nodes(&(drape_selection){.ctx = model->ctx,
+                                                        .pointer = pin->pointer,
+                                                        .form = &drape_form_pin,
+                                                        .mesh = &pin->cloth->mesh,
+                                                        DRAPE_SELECTED_BY(pin->def),
+                                                        .take = take_node,
+                                                        .user = pin}));
+        DRAPE_TRY(list_nodes(pin, to));
+        if (pin->track < 0)
             continue;
         double *pivot = model->tracks[pin->track].pivot;
         for (int32_t i = 0; i < to->node_count; i++)
@@ -315,7 +310,7 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
         if (!isnan(pin->def->pivot[0]))
             memcpy(pivot, pin->def->pivot, 3 * sizeof *pivot);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* The track of a node that is held in three directions: linear between the keys of all its tracks. */
@@ -344,15 +339,14 @@ static const drape_pin *full_pin_of(const drape_model *model, int32_t node)
                 return pin;
 }
 
-/* Nodes that some pins hold in all directions and others in some: these move alike. Pins that turn or that a
- * collider carries go before. */
+/* A node may be held by a pin in all directions and by other pins along some: these pins must move alike, but
+ * for a pin that turns or that a collider carries, whose motion counts alone. */
 static drape_status check_both(const drape_model *model, const pin_place *pin)
 {
-    drape_status status = DRAPE_OK;
-    for (int32_t node = 0; !status && node < model->node_count; node++) {
+    for (int32_t node = 0; node < model->node_count; node++) {
         const holding *all = &pin->all[node];
         const int32_t track = pin->track_of_node[node];
-        status = drape_check_cancel_after(model->ctx, 8);
+        DRAPE_TRY(drape_check_cancel_after(model->ctx, 8));
         if (!model->pinned[node] || !only_displaces(model, track))
             continue;
         for (int i = 0; i < all->count; i++) {
@@ -366,7 +360,7 @@ static drape_status check_both(const drape_model *model, const pin_place *pin)
             return refuse_motions(model, at, node, all->normal[i], full_pin_of(model, node));
         }
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* Nodes that are held in three directions are pinned: with a track, if one of them moves. */
@@ -386,14 +380,13 @@ static drape_status pin_held(drape_model *model, const pin_place *pin)
     if (!model->tracks)
         return DRAPE_E_MEMORY;
     memcpy(model->tracks, before, (size_t)model->track_count * sizeof *before);
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < model->node_count; i++)
+    for (int32_t i = 0; i < model->node_count; i++)
         if (pin->all[i].count == 3 && !model->pinned[i]) {
             model->pinned[i] = 1;
             pin->track_of_node[i] = model->track_count++;
-            status = join_tracks(model, &pin->all[i], &model->tracks[pin->track_of_node[i]]);
+            DRAPE_TRY(join_tracks(model, &pin->all[i], &model->tracks[pin->track_of_node[i]]));
         }
-    return status;
+    return DRAPE_OK;
 }
 
 /* The other nodes that have directions are free nodes with supports, unless another pin holds them
@@ -462,26 +455,25 @@ static drape_status turn_edges_of(drape_model *model, const drape_pin *pin, uint
 {
     const drape_cloth *cloth = &model->cloths[pin->cloth];
     const uint8_t *of_node = held + cloth->first_node;
-    drape_status status = drape_check_cancel_after(model->ctx, 4 * (size_t)cloth->mesh.edge_count);
+    DRAPE_TRY(drape_check_cancel_after(model->ctx, 4 * (size_t)cloth->mesh.edge_count));
     for (int32_t i = 0; i < pin->node_count; i++)
         held[pin->node[i]] = 1;
-    for (int32_t e = 0; !status && e < cloth->mesh.edge_count; e++) {
+    for (int32_t e = 0; e < cloth->mesh.edge_count; e++) {
         const int32_t *end = cloth->mesh.edge + 2 * (size_t)e;
         if (!of_node[end[0]] || !of_node[end[1]])
             continue;
         if (cloth->edge_turn[e] != UNKNOWN && cloth->edge_turn[e] != pin->turn)
-            status = refuse_turns(model, pin->cloth, end);
+            return refuse_turns(model, pin->cloth, end);
         cloth->edge_turn[e] = pin->turn;
     }
     for (int32_t i = 0; i < pin->node_count; i++)
         held[pin->node[i]] = 0;
-    return status;
+    return DRAPE_OK;
 }
 
 /* Finds the turns that clamped edges follow. */
 static drape_status turn_edges(drape_model *model, uint8_t *held)
 {
-    drape_status status = DRAPE_OK;
     for (int32_t p = 0; p < model->pin_count; p++) {
         drape_cloth *cloth = &model->cloths[model->pins[p].cloth];
         if (model->pins[p].turn < 0 || cloth->edge_turn)
@@ -493,16 +485,16 @@ static drape_status turn_edges(drape_model *model, uint8_t *held)
         for (int32_t e = 0; e < cloth->mesh.edge_count; e++)
             cloth->edge_turn[e] = UNKNOWN;
     }
-    for (int32_t p = 0; !status && p < model->pin_count; p++)
+    for (int32_t p = 0; p < model->pin_count; p++)
         if (model->pins[p].clamps && model->cloths[model->pins[p].cloth].edge_turn)
-            status = turn_edges_of(model, &model->pins[p], held);
-    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+            DRAPE_TRY(turn_edges_of(model, &model->pins[p], held));
+    for (int32_t c = 0; c < model->cloth_count; c++) {
         const drape_cloth *cloth = &model->cloths[c];
-        for (int32_t e = 0; !status && cloth->edge_turn && e < cloth->mesh.edge_count; e++)
+        for (int32_t e = 0; cloth->edge_turn && e < cloth->mesh.edge_count; e++)
             if (cloth->edge_clamped[e] && cloth->edge_turn[e] == UNKNOWN)
-                status = refuse_turns(model, c, cloth->mesh.edge + 2 * (size_t)e);
+                return refuse_turns(model, c, cloth->mesh.edge + 2 * (size_t)e);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track_of_node)
@@ -541,31 +533,21 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     model->pins = drape_arena_take(&model->arena, pin_count, sizeof *model->pins);
     model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
     model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
-    drape_arena scratch = drape_arena_of(model->ctx);
-    int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
-    uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
-    uint8_t *held = drape_arena_take(&scratch, nodes, sizeof *held);
-    holding *all = drape_arena_take(&scratch, nodes, sizeof *all);
-    drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
-    if (!status) {
-        memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
-        pin_place pin = {
-            .model = model, .track_of_node = track_of_node, .clamped = clamped, .held = held, .all = all};
-        for (int32_t c = 0; !status && c < model->cloth_count; c++)
-            status = pin_cloth(model, def, c, &pin);
-        if (!status)
-            status = check_both(model, &pin);
-        if (!status)
-            status = pin_held(model, &pin);
-        if (!status)
-            status = list_supports(model, &pin);
-        if (!status)
-            status = clamp_edges(model, clamped);
-        if (!status)
-            status = turn_edges(model, held);
-        if (!status)
-            status = drape_compile_number_nodes(model, track_of_node);
-    }
-    drape_arena_free(&scratch);
-    return status;
+    drape_arena *scratch = &model->scratch;
+    pin_place pin = {.model = model,
+                     .track_of_node = drape_arena_take(scratch, nodes, sizeof *pin.track_of_node),
+                     .clamped = drape_arena_take(scratch, nodes, sizeof *pin.clamped),
+                     .held = drape_arena_take(scratch, nodes, sizeof *pin.held),
+                     .all = drape_arena_take(scratch, nodes, sizeof *pin.all)};
+    DRAPE_TRY(drape_arena_status(&model->arena));
+    DRAPE_TRY(drape_arena_status(scratch));
+    memset(pin.track_of_node, 0xff, nodes * sizeof *pin.track_of_node); /* all -1 */
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        DRAPE_TRY(pin_cloth(model, def, c, &pin));
+    DRAPE_TRY(check_both(model, &pin));
+    DRAPE_TRY(pin_held(model, &pin));
+    DRAPE_TRY(list_supports(model, &pin));
+    DRAPE_TRY(clamp_edges(model, pin.clamped));
+    DRAPE_TRY(turn_edges(model, pin.held));
+    return drape_compile_number_nodes(model, pin.track_of_node);
 }

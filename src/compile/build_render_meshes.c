@@ -10,8 +10,7 @@ static drape_status bind_vertices(drape_model *model, const drape_mesh_source *s
                                   const double *normals, drape_cloth *cloth)
 {
     const drape_mesh *mesh = &cloth->render_mesh;
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < mesh->node_count; i++) {
+    for (int32_t i = 0; i < mesh->node_count; i++) {
         const double *point = mesh->x + 3 * (size_t)i;
         const double distance = drape_embed(tree, model->rest, normals, point, &cloth->bound[i]);
         cloth->bound[i].triangle += cloth->first_triangle;
@@ -21,9 +20,9 @@ static drape_status bind_vertices(drape_model *model, const drape_mesh_source *s
                                    "max_distance is %g m; remedy: bring both meshes to the same place and "
                                    "size, as by a transform, or raise max_distance",
                                    (int)i, point[0], point[1], point[2], distance, cloth->max_distance);
-        status = drape_check_cancel_after(model->ctx, 256 + (size_t)tree->count);
+        DRAPE_TRY(drape_check_cancel_after(model->ctx, 256 + (size_t)tree->count));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* normals: (node_count x 3) at rest. */
@@ -40,28 +39,18 @@ static drape_status bind_cloth(drape_model *model, int32_t c, const drape_scene_
         sum += cloth->mesh.edge_length[i];
     cloth->max_distance = isnan(def->max_distance) ? sum / cloth->mesh.edge_count : def->max_distance;
 
-    drape_status status =
-        drape_mesh_place(model->ctx, pointer, &def->mesh, scene->folder, &cloth->render_mesh);
-    if (!status)
-        status = drape_mesh_validate_indices(model->ctx, &source, &cloth->render_mesh);
-    if (!status && def->mesh.file && !(cloth->render_file = drape_arena_text(&model->arena, def->mesh.file)))
-        status = DRAPE_E_MEMORY;
-    if (status)
-        return status;
+    DRAPE_TRY(drape_mesh_place(model->ctx, pointer, &def->mesh, scene->folder, &cloth->render_mesh));
+    DRAPE_TRY(drape_mesh_validate_indices(model->ctx, &source, &cloth->render_mesh));
+    if (def->mesh.file)
+        cloth->render_file = drape_arena_text(&model->arena, def->mesh.file);
     cloth->bound =
         drape_arena_take(&model->arena, (size_t)cloth->render_mesh.node_count, sizeof *cloth->bound);
-    drape_arena scratch = drape_arena_of(model->ctx);
+    DRAPE_TRY(drape_arena_status(&model->arena));
     drape_bvh tree;
-    status = drape_bvh_build(&scratch, cloth->mesh.triangle_count, 3,
-                             model->triangle + 3 * (size_t)cloth->first_triangle, model->rest, &tree);
-    if (!status && !cloth->bound)
-        status = DRAPE_E_MEMORY;
-    if (!status) {
-        drape_bvh_fit(&tree, model->rest);
-        status = bind_vertices(model, &source, &tree, normals, cloth);
-    }
-    drape_arena_free(&scratch);
-    return status;
+    DRAPE_TRY(drape_bvh_build(&model->scratch, cloth->mesh.triangle_count, 3,
+                              model->triangle + 3 * (size_t)cloth->first_triangle, model->rest, &tree));
+    drape_bvh_fit(&tree, model->rest);
+    return bind_vertices(model, &source, &tree, normals, cloth);
 }
 
 /* Lists the mesh that frames show of each cloth, and where its nodes and triangles are. */
@@ -120,20 +109,19 @@ static drape_status gather(drape_model *model)
 drape_status drape_compile_render_meshes(drape_model *model, const drape_scene_def *def)
 {
     double *normals = NULL;
-    drape_status status = DRAPE_OK;
-    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+    for (int32_t c = 0; c < model->cloth_count; c++) {
         const drape_mesh_def *given = &def->cloths[c].render_mesh.mesh;
         if (!given->grid.type && !given->file && !given->positions && !given->triangles)
             continue;
         if (!normals) {
-            normals = drape_alloc(model->ctx, (size_t)model->node_count, 3 * sizeof *normals);
+            normals = drape_arena_take(&model->scratch, (size_t)model->node_count, 3 * sizeof *normals);
+            if (!normals)
+                return DRAPE_E_MEMORY;
             drape_model_normals(model, model->rest, normals);
         }
-        status = normals ? bind_cloth(model, c, def, normals) : DRAPE_E_MEMORY;
+        DRAPE_TRY(bind_cloth(model, c, def, normals));
         model->surface.bound = true;
     }
-    drape_free(model->ctx, normals);
-    if (!status)
-        status = list_cloths(model);
-    return status ? status : gather(model);
+    DRAPE_TRY(list_cloths(model));
+    return gather(model);
 }

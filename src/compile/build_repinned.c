@@ -47,8 +47,8 @@ static drape_status weigh(drape_model *model, const double *mass)
         model->cloths[c] = from[c];
         model->cloths[c].node_mass = model->mass + from[c].first_node;
     }
-    const drape_status status = drape_compile_weight(model);
-    return status ? status : drape_compile_contact_stiffness(model, NULL);
+    DRAPE_TRY(drape_compile_weight(model));
+    return drape_compile_contact_stiffness(model, NULL);
 }
 
 drape_status drape_compile_repinned(drape_context *ctx, const drape_model *base, const uint8_t *pinned,

@@ -1,4 +1,4 @@
-/* build_rides.c: pins that colliders carry: the point of its collider at which each begins. */
+/* build_rides.c: pins that colliders carry: at which point of its collider a pin begins. */
 #include "colliders/deformed.h"
 #include "compile/stages.h"
 #include "model/ride.h"
@@ -36,20 +36,18 @@ static drape_status find_carrier(const drape_model *model, const char *pointer, 
 static drape_status attach(drape_model *model, const drape_motion *motion, const drape_pin *pin,
                            int32_t collider, int32_t triangle)
 {
-    int32_t *on = drape_alloc(model->ctx, (size_t)pin->node_count + 1, sizeof *on);
+    int32_t *on = drape_arena_take(&model->scratch, (size_t)pin->node_count, sizeof *on);
     if (!on)
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < pin->node_count; i++)
         on[i] = triangle;
-    drape_status status = DRAPE_OK;
     if (triangle < 0)
-        status = drape_deformed_nearest(model->ctx, motion, collider, 0, pin->node_count, pin->node,
-                                        model->start, on);
-    for (int32_t i = 0; !status && i < pin->node_count; i++)
+        DRAPE_TRY(drape_deformed_nearest(model->ctx, motion, collider, 0, pin->node_count, pin->node,
+                                         model->start, on));
+    for (int32_t i = 0; i < pin->node_count; i++)
         drape_motion_ride_from(motion, collider, on[i], 0, model->start + 3 * (size_t)pin->node[i],
                                &model->ride[pin->node[i]]);
-    drape_free(model->ctx, on);
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
@@ -66,21 +64,18 @@ drape_status drape_compile_rides(drape_model *model, const drape_scene_def *def)
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < model->node_count; i++)
         ride[i] = drape_ride_none();
-    drape_arena scratch = drape_arena_of(model->ctx);
-    drape_status status = drape_motion_create(&scratch, model, &motion); /* of the colliders */
+    DRAPE_TRY(drape_motion_create(&model->scratch, model, &motion)); /* of the colliders */
     model->ride = ride;
     const drape_pin *pin = model->pins;
     for (size_t c = 0; c < def->cloth_count; c++)
-        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++, pin++) {
+        for (size_t p = 0; p < def->cloths[c].pin_count; p++, pin++) {
             const drape_pin_def *from = &def->cloths[c].pins[p];
             int32_t collider = -1;
             if (!from->attach && from->triangle < 0)
                 continue;
             const char *pointer = DRAPE_FORMAT("/cloth/%zu/pins/%zu", c, p);
-            status = find_carrier(model, pointer, from, &collider);
-            if (!status)
-                status = attach(model, motion, pin, collider, from->triangle);
+            DRAPE_TRY(find_carrier(model, pointer, from, &collider));
+            DRAPE_TRY(attach(model, motion, pin, collider, from->triangle));
         }
-    drape_arena_free(&scratch);
-    return status;
+    return DRAPE_OK;
 }

@@ -12,7 +12,8 @@ typedef struct side {
     const drape_seam_side_def *def;
     char pointer[64]; /* "/seams/0/a" */
     int32_t cloth;
-    int32_t *node; /* (count) in the order of the seam, local to the cloth; room for all nodes of the cloth */
+    int32_t
+        *node; /* (count) in the order of the seam, local to the cloth; memory for all nodes of the cloth */
     int32_t count;
     uint8_t *taken; /* (nodes of the cloth) 1: the side has it */
 } side;
@@ -30,11 +31,11 @@ static drape_status take_node(void *user, const char *key, int32_t local)
 /* ---- The order of a box ---- */
 
 /* Sorts the nodes along the longest side of their bounding box. */
-static drape_status sort(side *s, drape_arena *scratch)
+static drape_status sort(side *s)
 {
     const double *x = s->model->cloths[s->cloth].mesh.x;
     double low[3], high[3];
-    drape_node_along *list = drape_arena_take(scratch, (size_t)s->count, sizeof *list);
+    drape_node_along *list = drape_arena_take(&s->model->scratch, (size_t)s->count, sizeof *list);
     int axis = 0;
     if (!list)
         return DRAPE_E_MEMORY;
@@ -58,8 +59,9 @@ static drape_status sort(side *s, drape_arena *scratch)
 
 /* ---- A side ---- */
 
-static drape_status list_side(side *s, drape_arena *scratch)
+static drape_status list_side(side *s)
 {
+    drape_arena *scratch = &s->model->scratch;
     const drape_seam_side_def *def = s->def;
     for (s->cloth = 0; s->cloth < s->model->cloth_count; s->cloth++)
         if (strcmp(s->model->cloths[s->cloth].name, def->cloth) == 0)
@@ -77,17 +79,16 @@ static drape_status list_side(side *s, drape_arena *scratch)
                                        DRAPE_SELECTED_BY(def),
                                        .take = take_node,
                                        .user = s};
-    drape_status status = drape_arena_status(scratch);
-    if (!status)
-        status = drape_select_nodes(&selection);
-    if (!status && def->has_box)
-        status = sort(s, scratch);
-    for (int32_t i = 0, j = s->count - 1; !status && def->reverse && i < j; i++, j--) {
+    DRAPE_TRY(drape_arena_status(scratch));
+    DRAPE_TRY(drape_select_nodes(&selection));
+    if (def->has_box)
+        DRAPE_TRY(sort(s));
+    for (int32_t i = 0, j = s->count - 1; def->reverse && i < j; i++, j--) {
         const int32_t node = s->node[i];
         s->node[i] = s->node[j];
         s->node[j] = node;
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- A seam ---- */
@@ -118,26 +119,20 @@ static drape_status join(drape_model *model, const char *pointer, const side sid
 static drape_status compile_seam(drape_model *model, size_t i, const drape_seam_def *def)
 {
     drape_model_seam *to = &model->seams[i];
-    drape_arena scratch = drape_arena_of(model->ctx);
     side sides[2] = {{.model = model, .def = &def->a}, {.model = model, .def = &def->b}};
     const char *pointer = DRAPE_FORMAT("/seams/%zu", i);
-    drape_status status =
-        drape_compile_name(model, pointer, "seam", "seams", def->name, (int32_t)i, &to->name, sizeof *to);
-    if (!status)
-        status = drape_compile_choice(model, &def->entry, "", &to->choice);
-    for (int k = 0; !status && k < 2; k++) {
+    DRAPE_TRY(
+        drape_compile_name(model, pointer, "seam", "seams", def->name, (int32_t)i, &to->name, sizeof *to));
+    DRAPE_TRY(drape_compile_choice(model, &def->entry, "", &to->choice));
+    for (int k = 0; k < 2; k++) {
         snprintf(sides[k].pointer, sizeof sides[k].pointer, "%s/%c", pointer, "ab"[k]);
-        status = list_side(&sides[k], &scratch);
+        DRAPE_TRY(list_side(&sides[k]));
     }
-    if (!status)
-        status = join(model, pointer, sides, to);
-    drape_arena_free(&scratch);
-    return status;
+    return join(model, pointer, sides, to);
 }
 
 drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
 {
-    drape_status status = DRAPE_OK;
     if (def->seam_count == 0)
         return DRAPE_OK;
     model->seams = drape_arena_take(&model->arena, def->seam_count, sizeof *model->seams);
@@ -146,9 +141,10 @@ drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < model->node_count; i++)
         model->sewn[i] = i;
-    for (size_t i = 0; !status && i < def->seam_count; i++) {
-        status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_seam(model, i, &def->seams[i]);
+    for (size_t i = 0; i < def->seam_count; i++) {
+        DRAPE_TRY(drape_check_cancel(model->ctx));
+        DRAPE_TRY(compile_seam(model, i, &def->seams[i]));
         model->seam_count = (int32_t)i + 1;
     }
-    return status;
+    return DRAPE_OK;
 }

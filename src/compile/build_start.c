@@ -94,9 +94,7 @@ static drape_status fold(drape_model *model, const char *pointer, const drape_fo
                          int32_t node_count, double *x)
 {
     double frame[3][3], matrix[3][3];
-    const drape_status status = fold_frame(model, pointer, def, frame);
-    if (status)
-        return status;
+    DRAPE_TRY(fold_frame(model, pointer, def, frame));
     const double *d = frame[1], *n = frame[2], sign = def->angle < 0 ? -1 : 1;
     const double rolled = def->radius * fabs(def->angle) * RADIANS; /* arc length */
     bool beyond = false;
@@ -131,24 +129,20 @@ static drape_status place_nodes(drape_model *model, const char *pointer, const c
                         .triangle = mesh->triangle,
                         .x = x};
     const drape_mesh_source source = {.pointer = pointer};
-    drape_status status =
-        drape_mesh_check_transform(model->ctx, pointer, def->scale, def->rotate, def->translate);
-    if (!status && def->file)
-        status = take_file(model, pointer, folder, def, mesh, x);
-    if (!status && def->positions)
-        status =
-            take_array(model, pointer, "positions", def->positions, def->position_count, def->file, mesh, x);
-    if (!status)
-        status = drape_mesh_validate_positions(model->ctx, &source, &moved);
-    for (size_t i = 0; !status && i < def->fold_count; i++) {
+    DRAPE_TRY(drape_mesh_check_transform(model->ctx, pointer, def->scale, def->rotate, def->translate));
+    if (def->file)
+        DRAPE_TRY(take_file(model, pointer, folder, def, mesh, x));
+    if (def->positions)
+        DRAPE_TRY(
+            take_array(model, pointer, "positions", def->positions, def->position_count, def->file, mesh, x));
+    DRAPE_TRY(drape_mesh_validate_positions(model->ctx, &source, &moved));
+    for (size_t i = 0; i < def->fold_count; i++) {
         const char *place = DRAPE_FORMAT("%s/folds/%zu", pointer, i);
-        status = fold(model, place, &def->folds[i], mesh->node_count, x);
+        DRAPE_TRY(fold(model, place, &def->folds[i], mesh->node_count, x));
     }
-    if (status)
-        return status;
     drape_mesh_transform(&moved, def->scale, def->rotate, def->translate);
-    status = drape_mesh_validate_positions(model->ctx, &source, &moved);
-    return status ? status : drape_mesh_validate_shapes(model->ctx, &source, &moved);
+    DRAPE_TRY(drape_mesh_validate_positions(model->ctx, &source, &moved));
+    return drape_mesh_validate_shapes(model->ctx, &source, &moved);
 }
 
 /* ---- Velocities ---- */
@@ -158,21 +152,18 @@ static drape_status read_velocities(drape_model *model, const char *pointer, con
 {
     const char *place = DRAPE_FORMAT("%s/velocities", pointer);
     const drape_mesh_source source = {.pointer = place, .file = def->velocity_file};
-    drape_arena scratch = drape_arena_of(model->ctx);
     drape_contents whole = {0};
     drape_npy_array array = {0};
-    drape_status status = drape_contents_read(&scratch, place, folder, def->velocity_file, &whole);
-    if (!status)
-        status = drape_npy_array_parse(model->ctx, &source, whole.data, whole.size, &array);
-    if (!status && (array.dimensions != 2 || array.shape[0] != mesh->node_count || array.shape[1] != 3))
-        status = drape_mesh_fail(model->ctx, &source, 0,
-                                 "an array of %" PRId64 " x %" PRId64 " x %" PRId64
-                                 "; nodes x 3, %d x 3, is needed",
-                                 array.shape[0], array.shape[1], array.shape[2], (int)mesh->node_count);
-    for (size_t i = 0; !status && i < 3 * (size_t)mesh->node_count; i++)
+    DRAPE_TRY(drape_contents_read(&model->scratch, place, folder, def->velocity_file, &whole));
+    DRAPE_TRY(drape_npy_array_parse(model->ctx, &source, whole.data, whole.size, &array));
+    if (array.dimensions != 2 || array.shape[0] != mesh->node_count || array.shape[1] != 3)
+        return drape_mesh_fail(model->ctx, &source, 0,
+                               "an array of %" PRId64 " x %" PRId64 " x %" PRId64
+                               "; nodes x 3, %d x 3, is needed",
+                               array.shape[0], array.shape[1], array.shape[2], (int)mesh->node_count);
+    for (size_t i = 0; i < 3 * (size_t)mesh->node_count; i++)
         v[i] = drape_npy_array_at(&array, i);
-    drape_arena_free(&scratch);
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status add_velocities(drape_model *model, const char *pointer, const char *folder,
@@ -181,13 +172,14 @@ static drape_status add_velocities(drape_model *model, const char *pointer, cons
 {
     const drape_mesh *mesh = &cloth->mesh;
     const size_t count = 3 * (size_t)mesh->node_count;
-    double *own = drape_alloc(model->ctx, count, sizeof *own);
-    drape_status status = own ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status && def->velocity_file)
-        status = read_velocities(model, pointer, folder, def, mesh, own);
-    if (!status && def->velocities)
-        status = take_array(model, pointer, "velocities", def->velocities, def->velocity_count,
-                            def->velocity_file, mesh, own);
+    double *own = drape_arena_take(&model->scratch, count, sizeof *own);
+    if (!own)
+        return DRAPE_E_MEMORY;
+    if (def->velocity_file)
+        DRAPE_TRY(read_velocities(model, pointer, folder, def, mesh, own));
+    if (def->velocities)
+        DRAPE_TRY(take_array(model, pointer, "velocities", def->velocities, def->velocity_count,
+                             def->velocity_file, mesh, own));
     double pivot[3] = {0}, mass = 0;
     for (int32_t i = 0; i < mesh->node_count; i++) {
         vec3_add_scaled(cloth->node_mass[i], x + 3 * (size_t)i, pivot);
@@ -195,21 +187,20 @@ static drape_status add_velocities(drape_model *model, const char *pointer, cons
     }
     for (int k = 0; k < 3; k++)
         pivot[k] = isnan(def->pivot[0]) ? pivot[k] / mass : def->pivot[k];
-    for (int32_t i = 0; !status && i < mesh->node_count; i++) {
+    for (int32_t i = 0; i < mesh->node_count; i++) {
         double arm[3], turning[3];
         vec3_sub(x + 3 * (size_t)i, pivot, arm);
         vec3_cross(def->spin, arm, turning);
         for (int k = 0; k < 3; k++) {
             const double further = own[3 * (size_t)i + (size_t)k] + turning[k];
             if (!(fabs(further) <= DRAPE_MOST))
-                status =
-                    drape_refuse(model->ctx, pointer,
-                                 "the velocity of node %d is %g m/s; it is in [-1e9, 1e9]", (int)i, further);
+                return drape_refuse(model->ctx, pointer,
+                                    "the velocity of node %d is %g m/s; it is in [-1e9, 1e9]", (int)i,
+                                    further);
             v[3 * (size_t)i + (size_t)k] += further;
         }
     }
-    drape_free(model->ctx, own);
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- All cloths ---- */
@@ -235,8 +226,7 @@ drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
             return DRAPE_E_MEMORY;
         memcpy(model->start, model->rest, size);
     }
-    drape_status status = DRAPE_OK;
-    for (size_t c = 0; !status && c < def->cloth_count; c++) {
+    for (size_t c = 0; c < def->cloth_count; c++) {
         const drape_start_def *from = &def->cloths[c].start;
         drape_cloth *cloth = &model->cloths[c];
         double *x = model->start + 3 * (size_t)cloth->first_node;
@@ -245,12 +235,12 @@ drape_status drape_compile_start(drape_model *model, const drape_scene_def *def)
             cloth->start_file = drape_arena_text(&model->arena, from->file);
         if (from->velocity_file)
             cloth->velocity_file = drape_arena_text(&model->arena, from->velocity_file);
-        status = drape_arena_status(&model->arena);
-        if (!status && moves_nodes(from))
-            status = place_nodes(model, pointer, def->folder, from, &cloth->mesh, x);
-        if (!status && (from->velocity_file || from->velocities || vec3_norm(from->spin) > 0))
-            status = add_velocities(model, pointer, def->folder, from, cloth, x,
-                                    model->velocity + 3 * (size_t)cloth->first_node);
+        DRAPE_TRY(drape_arena_status(&model->arena));
+        if (moves_nodes(from))
+            DRAPE_TRY(place_nodes(model, pointer, def->folder, from, &cloth->mesh, x));
+        if (from->velocity_file || from->velocities || vec3_norm(from->spin) > 0)
+            DRAPE_TRY(add_velocities(model, pointer, def->folder, from, cloth, x,
+                                     model->velocity + 3 * (size_t)cloth->first_node));
     }
-    return status;
+    return DRAPE_OK;
 }

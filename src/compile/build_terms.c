@@ -5,157 +5,8 @@
 #include "terms/terms.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
-{
-    return drape_term_reserve_nodes(builder, element_count, builder->term->ops->nodes, rest_count);
-}
-
-drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
-                                      int rest_count)
-{
-    drape_elements *el = &builder->term->elements;
-    drape_arena *arena = &builder->model->arena;
-    if (builder->reserved)
-        return drape_term_refuse(builder, "%s announced its elements twice", builder->term->ops->entry.name);
-    if (element_count < 0 || rest_count < 0 || nodes < 1 || nodes > builder->term->ops->nodes)
-        return drape_term_refuse(builder,
-                                 "%s announced %d elements of %d nodes with %d numbers of rest data; nodes "
-                                 "are 1 to %d, and no count is negative",
-                                 builder->term->ops->entry.name, (int)element_count, nodes, rest_count,
-                                 builder->term->ops->nodes);
-    builder->reserved = true;
-    el->count = element_count;
-    el->nodes = nodes;
-    el->rest_count = rest_count;
-    el->params = builder->term->params;
-    el->tracks = builder->model->tracks;
-    el->node = builder->node =
-        drape_arena_take(arena, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
-    el->rest = builder->rest =
-        drape_arena_take(arena, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
-    for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
-        builder->node[i] = -1;
-    return drape_arena_status(arena);
-}
-
-drape_status drape_term_check_cancel(drape_term_builder *builder, size_t work)
-{
-    return drape_check_cancel_after(builder->model->ctx, work);
-}
-
-void drape_term_anchor(drape_term_builder *builder)
-{
-    builder->term->anchored = true;
-}
-
-void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes, const double *rest)
-{
-    const drape_elements *el = &builder->term->elements;
-    if (!builder->node || !builder->rest || element < 0 || element >= el->count) {
-        builder->strayed = true;
-        return;
-    }
-    for (int a = 0; a < el->nodes; a++)
-        builder->node[(size_t)element * (size_t)el->nodes + (size_t)a] = builder->first_node + nodes[a];
-    for (int k = 0; k < el->rest_count; k++)
-        builder->rest[(size_t)k * (size_t)el->count + (size_t)element] = rest[k];
-}
-
-double *drape_term_share(drape_term_builder *builder, int32_t count)
-{
-    drape_elements *el = &builder->term->elements;
-    if (el->shared || count <= 0)
-        return NULL;
-    double *shared = drape_arena_take(&builder->model->arena, (size_t)count, sizeof *shared);
-    el->shared = shared;
-    el->shared_count = shared ? count : 0;
-    return shared;
-}
-
-drape_status drape_term_reserve_sliders(drape_term_builder *builder, int count)
-{
-    drape_term *term = builder->term;
-    if (!builder->reserved || !term->ops->measure || term->sliders > 0 || count < 1 ||
-        count > DRAPE_MAX_SLIDERS)
-        return drape_term_refuse(builder,
-                                 "%s reserves %d sliders; 1 to %d, once, after the elements of a measure",
-                                 term->ops->entry.name, count, DRAPE_MAX_SLIDERS);
-    const size_t all = (size_t)count * (size_t)term->elements.count;
-    term->slider_stiffness = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_stiffness);
-    term->slider_limit = drape_arena_take(&builder->model->arena, all, sizeof *term->slider_limit);
-    term->sliders = count;
-    return drape_arena_status(&builder->model->arena);
-}
-
-void drape_term_set_slider(drape_term_builder *builder, int number, int32_t element, double stiffness,
-                           double limit)
-{
-    const drape_term *term = builder->term;
-    if (!term->slider_stiffness || !term->slider_limit || number < 0 || number >= term->sliders ||
-        element < 0 || element >= term->elements.count || !(stiffness >= 0) || !(limit >= 0) ||
-        isinf(stiffness) || isinf(limit)) {
-        builder->strayed = true;
-        return;
-    }
-    const size_t at = (size_t)number * (size_t)term->elements.count + (size_t)element;
-    term->slider_stiffness[at] = stiffness;
-    term->slider_limit[at] = limit;
-}
-
-drape_status drape_term_add_branch(drape_term_builder *builder, double fraction, double time)
-{
-    drape_cloth *cloth = &builder->model->cloths[builder->term->cloth];
-    const char *name = builder->term->ops->entry.name;
-    double sum = fraction;
-    if (!builder->term->ops->law || !(fraction > 0) || !(time > 0) || isinf(time) ||
-        cloth->branch_count == DRAPE_MAX_BRANCHES)
-        return drape_term_refuse(builder,
-                                 "%s adds a branch of the fraction %g with the time %g s; both are above 0, "
-                                 "and the laws of a cloth have at most %d branches",
-                                 name, fraction, time, DRAPE_MAX_BRANCHES);
-    for (int i = 0; i < cloth->branch_count; i++)
-        sum += cloth->branches[i].fraction;
-    if (sum > 1 + DRAPE_FRACTION_ROUNDING)
-        return drape_term_refuse(
-            builder, "the fractions of the stiffness that relax have the sum %.12g; it is at most 1", sum);
-    cloth->branches[cloth->branch_count++] = (drape_branch){fraction, time};
-    builder->model->has_branches = true;
-    return DRAPE_OK;
-}
-
-drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
-{
-    char text[512];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    return drape_refuse(builder->model->ctx, builder->pointer, "%s", text);
-}
-
-void drape_term_timed(drape_term_builder *builder, double from, double to)
-{
-    builder->term->timed[0] = from;
-    builder->term->timed[1] = to;
-}
-
-void drape_term_sew(drape_term_builder *builder, int32_t a, int32_t b)
-{
-    int32_t *sewn = builder->model->sewn;
-    if (!sewn || a < 0 || a >= builder->model->node_count || b < 0 || b >= builder->model->node_count) {
-        builder->strayed = true;
-        return;
-    }
-    while (sewn[a] != a)
-        a = sewn[a] = sewn[sewn[a]];
-    while (sewn[b] != b)
-        b = sewn[b] = sewn[sewn[b]];
-    sewn[a > b ? a : b] = a < b ? a : b;
-}
 
 /* pointer: to the name. */
 static drape_status find_term(drape_context *ctx, const drape_registry *registry, const char *pointer,
@@ -164,12 +15,11 @@ static drape_status find_term(drape_context *ctx, const drape_registry *registry
     const int built_in = drape_registry_count(registry);
     const bool of_seams = registry == &drape_seam_registry;
     int i;
-    drape_status status = drape_registry_choose(ctx, registry, pointer, name, &i);
-    if (!status && i < built_in)
-        *out = of_seams ? drape_seams[i] : drape_terms[i];
-    else if (!status)
-        *out = drape_context_term_ops(ctx, of_seams, i - built_in);
-    return status;
+    DRAPE_TRY(drape_registry_choose(ctx, registry, pointer, name, &i));
+    *out = i >= built_in ? drape_context_term_ops(ctx, of_seams, i - built_in)
+           : of_seams    ? drape_seams[i]
+                         : drape_terms[i];
+    return DRAPE_OK;
 }
 
 static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth, void *user)
@@ -253,13 +103,10 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
                                const drape_term_ops *ops, const drape_entry_def *def)
 {
     drape_term *term = &model->terms[model->term_count];
-    drape_status status = drape_check_cancel(model->ctx);
+    DRAPE_TRY(drape_check_cancel(model->ctx));
     term->ops = ops;
-    if (!status)
-        status = drape_params_resolve(model->ctx, pointer, &term->ops->entry, def->settings,
-                                      def->setting_count, term->params);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_params_resolve(model->ctx, pointer, &term->ops->entry, def->settings, def->setting_count,
+                                   term->params));
     term->cloth = c;
     term->seam = seam;
     term->elements.user = ops->user;
@@ -297,24 +144,21 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     for (int32_t i = 0; i < model->term_count && !ops->external; i++) /* loads may act on several places */
         if (model->terms[i].cloth == c && model->terms[i].ops == ops)
             return drape_refuse(model->ctx, pointer, "the term \"%s\" is named twice", def->type);
-    drape_status status = begin_term(model, c, -1, pointer, ops, def);
-    if (status)
-        return status;
+    DRAPE_TRY(begin_term(model, c, -1, pointer, ops, def));
     if (term->ops->law) {
         cloth->laws[cloth->law_count++] = term;
         return ops->build ? build_elements(model, term, pointer) : DRAPE_OK;
     }
-    status = build_elements(model, term, pointer);
-    return status ? status : drape_compile_history_of(model, pointer, def, term);
+    DRAPE_TRY(build_elements(model, term, pointer));
+    return drape_compile_history_of(model, pointer, def, term);
 }
 
 drape_status drape_compile_weight(drape_model *model)
 {
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < model->term_count; i++)
+    for (int32_t i = 0; i < model->term_count; i++)
         if (model->terms[i].ops->from_scene_gravity)
-            status = build_elements(model, &model->terms[i], "/gravity");
-    return status;
+            DRAPE_TRY(build_elements(model, &model->terms[i], "/gravity"));
+    return DRAPE_OK;
 }
 
 /* The term number i, first the built-in ones, then those of the context's user; NULL after the last. */
@@ -334,39 +178,37 @@ static size_t count_implied(const drape_context *ctx)
     return count;
 }
 
-/* Builds the terms that the scene names, then those that its gravity adds if it is not zero. gravity_history:
- * the name of theirs, or NULL. */
+/* Builds the terms that the scene names, then those that its gravity adds if it is not zero.
+ * gravity_history: the name of the history of the latter, or NULL. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
                                 const char *gravity_history)
 {
     const double *g = model->gravity;
     const bool has_gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
     const drape_term_ops *ops;
-    drape_status status = DRAPE_OK;
     model->cloths[c].laws = drape_arena_take(&model->arena, def->term_count + count_implied(model->ctx),
                                              sizeof *model->cloths[c].laws);
     if (!model->cloths[c].laws)
         return DRAPE_E_MEMORY;
-    for (size_t i = 0; !status && i < def->term_count; i++) {
+    for (size_t i = 0; i < def->term_count; i++) {
         const char *pointer = DRAPE_FORMAT("/cloth/%d/terms/%zu", (int)c, i);
-        status = find_term(model->ctx, &drape_term_registry, pointer, def->terms[i].type, &ops);
-        if (!status && ops->from_scene_gravity)
+        DRAPE_TRY(find_term(model->ctx, &drape_term_registry, pointer, def->terms[i].type, &ops));
+        if (ops->from_scene_gravity)
             return drape_refuse(
                 model->ctx, pointer,
                 "%s acts whenever the scene's \"gravity\" is not zero; leave it out of the terms",
                 ops->entry.name);
-        if (!status)
-            status = build_term(model, c, pointer, ops, &def->terms[i]);
+        DRAPE_TRY(build_term(model, c, pointer, ops, &def->terms[i]));
     }
-    for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++) {
+    for (int i = 0; has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++) {
         drape_term *term = &model->terms[model->term_count];
         if (!ops->from_scene_gravity)
             continue;
-        status = build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
-        if (!status && gravity_history)
-            status = drape_compile_history_named(model, "/gravity_history", gravity_history, term);
+        DRAPE_TRY(build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name}));
+        if (gravity_history)
+            DRAPE_TRY(drape_compile_history_named(model, "/gravity_history", gravity_history, term));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* A term whose dashpots are all 0 has no damping, so its rates are not needed. */
@@ -388,12 +230,9 @@ static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_
     const drape_term_ops *ops;
     const char *pointer = DRAPE_FORMAT("/seams/%d", (int)s);
     const char *at = DRAPE_FORMAT("%s/type", pointer);
-    drape_status status = find_term(model->ctx, &drape_seam_registry, at, def->type, &ops);
     seam->term = model->term_count;
-    if (!status)
-        status = begin_term(model, seam->cloth[0], s, pointer, ops, def);
-    if (status)
-        return status;
+    DRAPE_TRY(find_term(model->ctx, &drape_seam_registry, at, def->type, &ops));
+    DRAPE_TRY(begin_term(model, seam->cloth[0], s, pointer, ops, def));
     drape_term_builder builder = {.model = model, .term = &model->terms[seam->term], .pointer = pointer};
     drape_cloth_view cloth[2];
     drape_seam_view view = {.pair_count = seam->pair_count, .pair = seam->pair, .user = ops->user};
@@ -404,14 +243,12 @@ static drape_status build_seam(drape_model *model, int32_t s, const drape_entry_
         builder.owned_count[k] = side[k]->mesh.node_count;
     }
     model->ctx->message[0] = 0;
-    status = ops->build_seam(&view, builder.term->params, &builder);
-    status = drape_fail_unsaid(model->ctx, status, pointer, "build_seam() of \"%s\" returned %s",
-                               ops->entry.name, drape_status_name(status));
-    if (!status)
-        status = check_elements(&builder);
-    if (!status)
-        find_damping(model, builder.term);
-    return status;
+    const drape_status status = ops->build_seam(&view, builder.term->params, &builder);
+    DRAPE_TRY(drape_fail_unsaid(model->ctx, status, pointer, "build_seam() of \"%s\" returned %s",
+                                ops->entry.name, drape_status_name(status)));
+    DRAPE_TRY(check_elements(&builder));
+    find_damping(model, builder.term);
+    return DRAPE_OK;
 }
 
 void drape_compile_number_elements(drape_model *model, drape_term *term)
@@ -462,25 +299,23 @@ static drape_status connect_laws(drape_model *model, int32_t c)
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
 {
     size_t count = 0;
-    drape_status status = DRAPE_OK;
     for (size_t c = 0; c < def->cloth_count; c++)
         count += def->cloths[c].term_count + count_implied(model->ctx);
     count += (size_t)model->seam_count;
     model->terms = drape_arena_take(&model->arena, count, sizeof *model->terms);
     if (!model->terms)
         return DRAPE_E_MEMORY;
-    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
-        status = build_cloth(model, c, &def->cloths[c], def->gravity_history);
-        if (!status)
-            status = connect_laws(model, c);
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        DRAPE_TRY(build_cloth(model, c, &def->cloths[c], def->gravity_history));
+        DRAPE_TRY(connect_laws(model, c));
     }
-    for (int32_t s = 0; !status && s < model->seam_count; s++)
-        status = build_seam(model, s, &def->seams[s].entry);
+    for (int32_t s = 0; s < model->seam_count; s++)
+        DRAPE_TRY(build_seam(model, s, &def->seams[s].entry));
     for (int32_t i = 0; model->sewn && i < model->node_count; i++) /* ascending: those before are final */
         model->sewn[i] = model->sewn[model->sewn[i]];
-    for (int32_t i = 0; !status && i < model->term_count; i++)
+    for (int32_t i = 0; i < model->term_count; i++)
         drape_compile_number_elements(model, &model->terms[i]);
-    return status;
+    return DRAPE_OK;
 }
 
 static bool well_formed(const drape_term_ops *ops)
@@ -506,16 +341,7 @@ static bool well_formed(const drape_term_ops *ops)
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)
 {
     drape_term_ops own = {0}, *ops = &own;
-    if (!ctx)
-        return DRAPE_E_ARGUMENT;
-    if (!given)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_term: there are no ops");
-    if (!drape_def_fits(given->struct_size, MIN_SIZE, sizeof own))
-        return drape_fail(
-            ctx, DRAPE_E_VERSION,
-            "the ops of a term have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, MIN_SIZE);
-    memcpy(&own, given, given->struct_size);
+    DRAPE_TRY(drape_compile_take_ops(ctx, "term", given, MIN_SIZE, &own, sizeof own));
     if (!well_formed(ops))
         return drape_fail(
             ctx, DRAPE_E_ARGUMENT,

@@ -42,27 +42,22 @@ static drape_status check_array(checker *c, const drape_scene_key *key, const ch
     memcpy(&count, def + key->count_offset, sizeof count);
     if (count > 0 && !array)
         return refuse_null(c, "the array");
-    if (key->at_most && count > key->at_most) {
-        char takes[128];
-        drape_scene_takes_text(key, takes, sizeof takes);
+    if (key->at_most && count > key->at_most)
         return drape_refuse(c->ctx, c->at.text, "an array of %zu is not allowed; %s is %s", count,
-                            key->param.name, takes);
-    }
+                            key->param.name, DRAPE_KEY_TAKES(key));
     const bool has_texts = key->shape == DRAPE_SCENE_LIST && key->param.kind == DRAPE_PARAM_TEXT;
     const drape_scene_key text = {.param = {.name = "an element",
                                             .kind = DRAPE_PARAM_TEXT,
                                             .unit = "1",
                                             .default_value = NAN,
                                             .help = key->param.help}};
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && (key->child || has_texts) && i < count; i++) {
+    for (size_t i = 0; (key->child || has_texts) && i < count; i++) {
         drape_pointer_push_index(&c->at, i);
-        status = key->child ? check_object(c, key->child, array + i * size)
-                            : check_value(c, &text, array + i * size);
-        if (!status)
-            drape_pointer_cut(&c->at, mark);
+        DRAPE_TRY(key->child ? check_object(c, key->child, array + i * size)
+                             : check_value(c, &text, array + i * size));
+        drape_pointer_cut(&c->at, mark);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status check_object(checker *c, const drape_scene_object *object, const char *def)
@@ -79,33 +74,19 @@ static drape_status check_object(checker *c, const drape_scene_object *object, c
     for (size_t i = 0; i < count; i++)
         if (!settings[i].name)
             return refuse_null(c, "the name of a setting");
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < object->key_count; i++) {
+    for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         drape_pointer_push(&c->at, key->param.name);
-        switch (key->shape) {
-        case DRAPE_SCENE_VALUE:
-            status = check_value(c, key, def);
-            break;
-        case DRAPE_SCENE_OBJECT:
-            status = check_object(c, key->child, def + key->offset);
-            break;
-        case DRAPE_SCENE_LIST:
-        case DRAPE_SCENE_TRACK:
-        case DRAPE_SCENE_OBJECTS:
-        case DRAPE_SCENE_ENTRIES:
-            status = check_array(c, key, def);
-            break;
-        case DRAPE_SCENE_VERSION:
-        case DRAPE_SCENE_REMARK:
-        case DRAPE_SCENE_BOX:
-        case DRAPE_SCENE_QUATERNION:
-            break;
-        }
-        if (!status)
-            drape_pointer_cut(&c->at, mark);
+        if (key->shape == DRAPE_SCENE_VALUE)
+            DRAPE_TRY(check_value(c, key, def));
+        else if (key->shape == DRAPE_SCENE_OBJECT)
+            DRAPE_TRY(check_object(c, key->child, def + key->offset));
+        else if (key->shape == DRAPE_SCENE_LIST || key->shape == DRAPE_SCENE_TRACK ||
+                 key->shape == DRAPE_SCENE_OBJECTS || key->shape == DRAPE_SCENE_ENTRIES)
+            DRAPE_TRY(check_array(c, key, def));
+        drape_pointer_cut(&c->at, mark);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def)

@@ -60,13 +60,10 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
     model->duration = def->duration;
     model->frame_rate = def->frame_rate;
     model->z_up = def->up && strcmp(def->up, "z") == 0;
-    drape_status status =
-        drape_compile_choice(model, &def->integrator, default_text("/integrator/method"), &model->integrator);
-    if (!status)
-        status = drape_compile_choice(model, &def->controller, default_text("/controller/type"),
-                                      &model->controller);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_compile_choice(model, &def->integrator, default_text("/integrator/method"),
+                                   &model->integrator));
+    DRAPE_TRY(
+        drape_compile_choice(model, &def->controller, default_text("/controller/type"), &model->controller));
     model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
     if (!model->formats)
         return DRAPE_E_MEMORY;
@@ -81,24 +78,20 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
     const drape_cloth_def *def = &scene->cloths[c];
     drape_cloth *cloth = &model->cloths[c];
     const char *pointer = DRAPE_FORMAT("/cloth/%d", (int)c);
-    drape_status status =
-        drape_compile_name(model, pointer, "cloth", "cloths", def->name, c, &cloth->name, sizeof *cloth);
+    DRAPE_TRY(
+        drape_compile_name(model, pointer, "cloth", "cloths", def->name, c, &cloth->name, sizeof *cloth));
     const char *at = DRAPE_FORMAT("%s/mesh", pointer);
-    if (!status)
-        status = drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh);
-    if (!status)
-        status = drape_compile_choice(model, &def->mesh.grid, "", &cloth->grid);
-    if (!status && def->mesh.file && !(cloth->file = drape_arena_text(&model->arena, def->mesh.file)))
-        status = DRAPE_E_MEMORY;
-    if (!status)
-        status = drape_compile_material(model, pointer, def, cloth);
-    if (!status)
-        status = drape_compile_masses(model, pointer, def, cloth);
+    DRAPE_TRY(drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh));
+    DRAPE_TRY(drape_compile_choice(model, &def->mesh.grid, "", &cloth->grid));
+    if (def->mesh.file && !(cloth->file = drape_arena_text(&model->arena, def->mesh.file)))
+        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_compile_material(model, pointer, def, cloth));
+    DRAPE_TRY(drape_compile_masses(model, pointer, def, cloth));
     memcpy(cloth->scale, def->mesh.scale, sizeof cloth->scale);
     memcpy(cloth->rotate, def->mesh.rotate, sizeof cloth->rotate);
     memcpy(cloth->translate, def->mesh.translate, sizeof cloth->translate);
     memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
-    return status;
+    return DRAPE_OK;
 }
 
 static void copy_numbers(int32_t *to, const int32_t *from, size_t count, int32_t first)
@@ -154,26 +147,26 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
     model->cloths = drape_arena_take(&model->arena, def->cloth_count, sizeof *model->cloths);
     if (!model->cloths)
         return DRAPE_E_MEMORY;
-    drape_status status = DRAPE_OK;
-    for (size_t c = 0; !status && c < def->cloth_count; c++) {
-        status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_cloth(model, (int32_t)c, def);
+    for (size_t c = 0; c < def->cloth_count; c++) {
         model->cloth_count = (int32_t)c + 1; /* count an unfinished cloth, too, so that it is freed */
+        DRAPE_TRY(drape_check_cancel(model->ctx));
+        DRAPE_TRY(compile_cloth(model, (int32_t)c, def));
     }
     int64_t nodes = 0, triangles = 0, edges = 0;
-    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+    for (int32_t c = 0; c < model->cloth_count; c++) {
         model->cloths[c].first_node = (int32_t)nodes;
         model->cloths[c].first_triangle = (int32_t)triangles;
         nodes += model->cloths[c].mesh.node_count;
         triangles += model->cloths[c].mesh.triangle_count;
         edges += model->cloths[c].mesh.edge_count;
         if (nodes > DRAPE_MAX_NODES)
-            status = drape_refuse(model->ctx, "/cloth", "the cloths have more than %d nodes together",
-                                  DRAPE_MAX_NODES);
+            return drape_refuse(model->ctx, "/cloth", "the cloths have more than %d nodes together",
+                                DRAPE_MAX_NODES);
     }
     model->node_count = (int32_t)nodes;
     model->triangle_count = (int32_t)triangles;
     model->edge_count = (int32_t)edges;
-    return status ? status : gather(model);
+    return gather(model);
 }
 
 /* The initial velocity applies only to free nodes, and to those with supports without what is along the
@@ -205,11 +198,13 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)
         return DRAPE_E_MEMORY;
-    model->arena = drape_arena_of(ctx);
+    model->arena = model->scratch = drape_arena_of(ctx);
     model->ctx = ctx;
     drape_status status = drape_compile_check_def(ctx, def);
-    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++)
+    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++) {
         status = drape_check_cancel(ctx) ? DRAPE_E_STOPPED : stages[i](model, def);
+        drape_arena_free(&model->scratch);
+    }
     if (!status)
         status = drape_compile_pattern(model);
     for (int32_t c = 0; c < model->cloth_count; c++) /* a scene without bending keeps no hinges */

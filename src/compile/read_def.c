@@ -28,9 +28,7 @@ static size_t stride_of(const char *array, size_t count, size_t size)
 static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
                                  char *def)
 {
-    drape_status status = DRAPE_OK;
-    for (const drape_scene_key *key = object->keys; !status && key < object->keys + object->key_count;
-         key++) {
+    for (const drape_scene_key *key = object->keys; key < object->keys + object->key_count; key++) {
         const char *from;
         size_t count;
         if (key->shape != DRAPE_SCENE_OBJECTS || !key->child->least_size)
@@ -48,14 +46,14 @@ static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const d
         if (!to)
             return DRAPE_E_MEMORY;
         memcpy(def + key->offset, &to, sizeof to);
-        for (size_t i = 0; !status && i < count; i++) {
+        for (size_t i = 0; i < count; i++) {
             drape_scene_set_defaults(key->child, to + i * size);
             memcpy(to + i * size, from + i * stride, stride);
             memcpy(to + i * size, &size, sizeof size);
-            status = widen_arrays(ctx, arena, key->child, to + i * size);
+            DRAPE_TRY(widen_arrays(ctx, arena, key->child, to + i * size));
         }
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,

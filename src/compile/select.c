@@ -11,11 +11,10 @@
 static drape_status take_range(const drape_selection *s, const char *key, int32_t first_row, int32_t last_row,
                                int32_t first_column, int32_t last_column)
 {
-    drape_status status = DRAPE_OK;
     for (int32_t r = first_row; r <= last_row; r++)
-        for (int32_t c = first_column; !status && c <= last_column; c++)
-            status = s->take(s->user, key, r * s->mesh->columns + c);
-    return status;
+        for (int32_t c = first_column; c <= last_column; c++)
+            DRAPE_TRY(s->take(s->user, key, r * s->mesh->columns + c));
+    return DRAPE_OK;
 }
 
 /* Narrows first and last row, first and last column to the side with which the text begins. */
@@ -48,9 +47,9 @@ static drape_status take_box(const drape_selection *s)
     for (int k = 0; k < 3; k++)
         if (!(low[k] <= high[k]))
             return drape_fail_below(s->ctx, s->pointer, "box", "min must not be above max in any coordinate");
-    drape_status status = drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count);
+    DRAPE_TRY(drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count));
     int32_t taken = 0;
-    for (int32_t i = 0; !status && i < s->mesh->node_count; i++) {
+    for (int32_t i = 0; i < s->mesh->node_count; i++) {
         const double *x = s->mesh->x + 3 * (size_t)i;
         bool inside = true;
         for (int k = 0; k < 3; k++) {
@@ -60,38 +59,37 @@ static drape_status take_box(const drape_selection *s)
         }
         taken += inside;
         if (inside)
-            status = s->take(s->user, "box", i);
+            DRAPE_TRY(s->take(s->user, "box", i));
     }
-    if (!status && taken == 0)
-        status = drape_fail_below(s->ctx, s->pointer, "box", "no node lies in the box");
-    return status;
+    if (taken == 0)
+        return drape_fail_below(s->ctx, s->pointer, "box", "no node lies in the box");
+    return DRAPE_OK;
 }
 
 drape_status drape_select_nodes(const drape_selection *s)
 {
     const char *on_grid = s->corner ? "corner" : s->edge ? "edge" : s->row >= 0 ? "row" : NULL;
-    drape_status status = DRAPE_OK;
     int given = (s->nodes != NULL) + (s->corner != NULL) + (s->edge != NULL) + (s->row >= 0) + s->has_box;
     if (given != 1) {
         char wanted[128];
-        drape_scene_one_of_text(s->form, wanted, sizeof wanted);
-        return drape_refuse(s->ctx, s->pointer, "%s is needed", wanted);
+        return drape_refuse(s->ctx, s->pointer, "%s is needed",
+                            drape_scene_one_of_text(s->form, wanted, sizeof wanted));
     }
     if (on_grid && s->mesh->rows == 0)
         return drape_fail_below(
             s->ctx, s->pointer, on_grid,
             "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
-    for (size_t i = 0; !status && s->nodes && i < s->node_count; i++) {
+    for (size_t i = 0; s->nodes && i < s->node_count; i++) {
         const int32_t node = s->nodes[i], count = s->mesh->node_count;
         const char *key = DRAPE_FORMAT("nodes/%zu", i);
-        status = node >= 0 && node < count
-                     ? s->take(s->user, key, node)
-                     : drape_fail_below(s->ctx, s->pointer, key,
-                                        "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
-                                        (int)count - 1);
+        DRAPE_TRY(node >= 0 && node < count
+                      ? s->take(s->user, key, node)
+                      : drape_fail_below(s->ctx, s->pointer, key,
+                                         "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
+                                         (int)count - 1));
     }
     if (s->nodes)
-        return status;
+        return DRAPE_OK;
     if (s->corner)
         return take_sides(s, "corner", s->corner, strchr(s->corner, '-') + 1);
     if (s->edge)

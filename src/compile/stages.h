@@ -61,6 +61,11 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
 /* The default of contact's stiffness, after the colliders, whose tracks it depends on. def is not used. */
 drape_status drape_compile_contact_stiffness(drape_model *model, const drape_scene_def *def);
 
+/* Copies the function table that a host gives for a term or collider, which begins with its struct_size: at
+ * least `least` bytes, and at most `size`. Errors: DRAPE_E_ARGUMENT, DRAPE_E_VERSION. */
+drape_status drape_compile_take_ops(drape_context *ctx, const char *what, const void *given, size_t least,
+                                    void *own, size_t size);
+
 /* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
 
