@@ -231,7 +231,7 @@ static void lay_out(int numbers, const double *from, int32_t count, double *to)
 static void measure(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const drape_elements *el = &term->elements;
-    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    const double *internal = drape_term_own(term, want->point->internal);
     const bool second = want->hessian && !want->velocity;
     const int d = 3 * el->nodes;
     if (!term->ops->lanes) {
@@ -330,8 +330,7 @@ static void hessians_of_measures(const drape_term *term, const drape_request *wa
         /* Moves ddq in b->hessian by positive_share towards the part of it that is positive semidefinite
          * under the measure's force. */
         const drape_elements *el = &term->elements;
-        const double *internal =
-            term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+        const double *internal = drape_term_own(term, want->point->internal);
         const int size = 9 * el->nodes * el->nodes;
         term->ops->positive(el, b->first, b->count, want->point->x, internal, b->of_ddq, b->scratch);
         for (int32_t i = 0; i < b->count; i++) {
@@ -481,8 +480,7 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
         evaluate_measures(term, want, b);
     else if (term->ops->energy) {
         const drape_elements el = elements_at(term, want->point);
-        const double *internal =
-            term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+        const double *internal = drape_term_own(term, want->point->internal);
         term->ops->energy(&el, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
                           want->hessian ? b->hessian : NULL);
         if (term->history && term->ops->external)

@@ -21,7 +21,7 @@
  */
 #include "assemble/check.h"
 
-#include "base/elementary.h"
+#include "base/rotation.h"
 #include "colliders/colliders.h"
 
 #include <float.h>
@@ -97,23 +97,17 @@ static double ratio(double difference, double scale)
 static void make_state(checker *c, const drape_state *rest)
 {
     const drape_model *m = c->model;
+    /* by 0.7 rad about (1, 2, 3)/sqrt(14) */
+    const double turn[3] = {0.7 / sqrt(14.0), 1.4 / sqrt(14.0), 2.1 / sqrt(14.0)};
+    double R[9];
+    drape_rotation_exp(turn, R);
     for (size_t i = 0; i < (size_t)m->node_count; i++) {
         double deformed[3];
         for (int k = 0; k < 3; k++) {
             deformed[k] = rest->x[3 * i + (size_t)k] + DEFORMATION * c->size * uniform(c);
             c->v[3 * i + (size_t)k] = c->size * uniform(c);
         }
-        /* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
-        double *out = c->x + 3 * i;
-        const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)};
-        double sine, cosine;
-        drape_sin_cos(0.7, &sine, &cosine);
-        double along = k[0] * deformed[0] + k[1] * deformed[1] + k[2] * deformed[2];
-        const double cross[3] = {k[1] * deformed[2] - k[2] * deformed[1],
-                                 k[2] * deformed[0] - k[0] * deformed[2],
-                                 k[0] * deformed[1] - k[1] * deformed[0]};
-        for (int j = 0; j < 3; j++)
-            out[j] = cosine * deformed[j] + sine * cross[j] + (1 - cosine) * along * k[j];
+        drape_rotation_turn(R, deformed, c->x + 3 * i);
     }
     memcpy(c->internal, rest->internal, (size_t)m->internal_count * sizeof *c->internal);
     /* Maxwell branches are extended as strains are, and were so a part of their time ago. */
@@ -141,7 +135,7 @@ static void evaluate(const checker *c, const drape_term *term, int32_t e, local 
     const double *x = c->x, *v = c->v, *internal = c->internal;
     drape_elements el = drape_term_elements(term, c->t);
     el.progress = c->progress;
-    const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+    const double *own = drape_term_own(term, internal);
     memset(out, 0, sizeof *out);
     if (term->ops->measure)
         term->ops->measure(&el, e, 1, x, own, &out->scalar, out->gradient, out->hessian);
@@ -470,9 +464,7 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
                                .history = history,
                                .t = c->t,
                                .turning = true};
-    drape_status status = prepare_jacobian(c, &point);
-    if (status)
-        return status;
+    DRAPE_TRY(prepare_jacobian(c, &point));
     drape_system_jacobian(c->system, &point, 0, 0, c->values);
     report(c, "assembled", what,
            largest_direction_error(c, DIFFERENCE_STEP * c->size, &point, drape_system_force), HESSIAN_LIMIT);
@@ -537,11 +529,8 @@ static drape_status compare_contact(checker *c, double distance, errors *max)
     drape_state state = {.x = c->x, .v = c->v};
     drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .weight = 60};
     size_t n = 3 * (size_t)c->model->node_count;
-    drape_status status = drape_system_begin(c->system, &state);
-    if (!status)
-        status = prepare_jacobian(c, &point);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_system_begin(c->system, &state));
+    DRAPE_TRY(prepare_jacobian(c, &point));
     double step = DIFFERENCE_STEP * distance, best = INFINITY;
     drape_system_contact_part(c->system, &point, true, NULL, c->values);
     max->hessian = fmax(max->hessian, largest_direction_error(c, step, &point, contact_force));
@@ -570,24 +559,22 @@ static void report_contact(checker *c, const char *name, errors max)
 static drape_status check_contact(checker *c, const drape_state *rest)
 {
     const drape_contact_def *def = &c->model->contact;
-    drape_status status = DRAPE_OK;
-    errors max = {0};
+    errors max = {0}, self = {0};
     if (!drape_system_contact(c->system))
-        return status;
-    for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
+        return DRAPE_OK;
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
         make_state(c, rest);
         approach(c, &c->model->colliders[k], def->distance / 2);
-        status = compare_contact(c, def->distance, &max);
+        DRAPE_TRY(compare_contact(c, def->distance, &max));
     }
-    if (!status && c->model->collider_count > 0)
+    if (c->model->collider_count > 0)
         report_contact(c, "contact", max);
-    if (status || !def->self)
-        return status;
-    max = (errors){0};
+    if (!def->self)
+        return DRAPE_OK;
     fold(c, def->self_thickness);
-    status = compare_contact(c, def->self_thickness, &max);
-    report_contact(c, "self_contact", max);
-    return status;
+    DRAPE_TRY(compare_contact(c, def->self_thickness, &self));
+    report_contact(c, "self_contact", self);
+    return DRAPE_OK;
 }
 
 /* ---- All checks ---- */
@@ -605,10 +592,10 @@ static double turning_time(const drape_model *model)
 
 static drape_status check_terms(drape_context *ctx, checker *c)
 {
-    drape_status status = DRAPE_OK;
-    for (int32_t t = 0; t < c->model->term_count && !(status = drape_check_cancel(ctx)); t++) {
+    for (int32_t t = 0; t < c->model->term_count; t++) {
         const drape_term *term = &c->model->terms[t];
         const char *const name = term->ops->entry.name;
+        DRAPE_TRY(drape_check_cancel(ctx));
         if (term->ops->law) {
             /* At one state, with a difference along each of the law's arguments. */
             const double k = 2.385, at = 0.117, moves = -0.731, h = DIFFERENCE_STEP;
@@ -628,7 +615,28 @@ static drape_status check_terms(drape_context *ctx, checker *c)
         if (term->ops->measure || (term->seam >= 0 && term->ops->energy && !term->ops->external))
             check_invariance(c, t);
     }
-    return status;
+    return DRAPE_OK;
+}
+
+static drape_status check_all(drape_context *ctx, checker *c)
+{
+    drape_state rest;
+    double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
+    const size_t n = 3 * (size_t)c->model->node_count;
+    DRAPE_TRY(drape_state_create(c->arena, c->model, &rest));
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        *arrays[i] = drape_arena_take(c->arena, n, sizeof(double));
+    for (int i = 0; i < 2 * LEVELS; i++)
+        c->beside[i] = drape_arena_take(c->arena, n, sizeof(double));
+    c->internal = drape_arena_take(c->arena, (size_t)c->model->internal_count, sizeof(double));
+    c->history = drape_arena_take(c->arena, (size_t)c->model->measure_count, sizeof(double));
+    DRAPE_TRY(drape_arena_status(c->arena));
+    make_state(c, &rest);
+    DRAPE_TRY(check_terms(ctx, c));
+    DRAPE_TRY(check_jacobian(c, "Jacobian in a step", 60, c->history));
+    DRAPE_TRY(check_jacobian(c, "Jacobian in continuous time", 60, NULL));
+    DRAPE_TRY(drape_check_cancel(ctx));
+    return check_contact(c, &rest);
 }
 
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
@@ -636,39 +644,14 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
 {
     const drape_model *model = drape_system_model(system);
     drape_arena arena = drape_arena_of(ctx);
-    drape_state rest;
     checker c = {.system = system,
                  .model = model,
+                 .arena = &arena,
                  .random = seed,
                  .size = drape_model_mean_edge(model),
                  .results = results,
                  .t = turning_time(model)};
-    *result_count = 0;
-    drape_status status = drape_state_create(&arena, model, &rest);
-    if (!status) {
-        size_t n = 3 * (size_t)c.model->node_count, measures = (size_t)c.model->measure_count;
-        double **arrays[] = {&c.x, &c.v, &c.x2, &c.v2, &c.g1, &c.g2, &c.direction};
-        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-            *arrays[i] = drape_arena_take(&arena, n, sizeof(double));
-        for (int i = 0; i < 2 * LEVELS; i++)
-            c.beside[i] = drape_arena_take(&arena, n, sizeof(double));
-        c.internal = drape_arena_take(&arena, (size_t)c.model->internal_count, sizeof(double));
-        c.history = drape_arena_take(&arena, measures, sizeof(double));
-        c.arena = &arena;
-        status = drape_arena_status(&arena);
-    }
-    if (!status) {
-        make_state(&c, &rest);
-        status = check_terms(ctx, &c);
-    }
-    if (!status)
-        status = check_jacobian(&c, "Jacobian in a step", 60, c.history);
-    if (!status)
-        status = check_jacobian(&c, "Jacobian in continuous time", 60, NULL);
-    if (!status)
-        status = drape_check_cancel(ctx);
-    if (!status)
-        status = check_contact(&c, &rest);
+    const drape_status status = check_all(ctx, &c);
     *result_count = c.result_count;
     drape_arena_free(&arena);
     return status;

@@ -13,9 +13,7 @@ static void strains_of(const drape_term *term, int32_t first, int32_t count, dou
 {
     const drape_elements el = drape_term_elements(term, t);
     const double *q0 = el.rest + (size_t)el.count + first;
-    term->ops->measure(&el, first, count, x,
-                       term->first_internal >= 0 ? internal + term->first_internal : NULL, strain, NULL,
-                       NULL);
+    term->ops->measure(&el, first, count, x, drape_term_own(term, internal), strain, NULL, NULL);
     for (int32_t i = 0; i < count; i++)
         strain[i] -= q0[i];
 }

@@ -444,7 +444,7 @@ void drape_summer_measure(drape_summer *s, const drape_term *term, const drape_p
 {
     const drape_request want = {.point = point, .conservative = true};
     drape_parts_work *work = s->parts[term - s->model->terms];
-    const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
+    const double *internal = drape_term_own(term, point->internal);
     if (!work) {
         term->ops->measure(&term->elements, 0, term->elements.count, point->x, internal, q, NULL, NULL);
         return;

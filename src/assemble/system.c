@@ -52,8 +52,7 @@ struct drape_system {
 
 /* ---- Creation ---- */
 
-drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
-                                 drape_system **out)
+static drape_status create(drape_arena *arena, const drape_model *model, int threads, drape_system **out)
 {
     drape_system *system = *out = drape_arena_take(arena, 1, sizeof *system);
     if (!system)
@@ -77,15 +76,17 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
                               &system->space[0], &system->space[1],  &system->space[2]};
     for (size_t i = 0; model->supports_move && i < sizeof moved / sizeof *moved; i++)
         *moved[i] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
-    drape_status status = drape_arena_status(arena);
-    if (!status)
-        status = drape_pool_create(arena, threads, &system->pool);
-    if (!status)
-        status = drape_summer_create(arena, model, system->pool, &system->summer);
-    if (!status)
-        status = drape_motion_create(arena, model, &system->motion);
-    if (!status)
-        status = drape_wind_create(arena, model, &system->wind);
+    DRAPE_TRY(drape_arena_status(arena));
+    DRAPE_TRY(drape_pool_create(arena, threads, &system->pool));
+    DRAPE_TRY(drape_summer_create(arena, model, system->pool, &system->summer));
+    DRAPE_TRY(drape_motion_create(arena, model, &system->motion));
+    return drape_wind_create(arena, model, &system->wind);
+}
+
+drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
+                                 drape_system **out)
+{
+    const drape_status status = create(arena, model, threads, out);
     if (status)
         drape_system_destroy(out);
     return status;
@@ -1030,17 +1031,20 @@ void drape_system_stress(drape_system *system, const drape_point *given, const d
 
 /* ---- Checks ---- */
 
-static drape_status check_terms(const drape_system *system, const double *given, const double *given_before,
-                                const double *internal, const char **reason, drape_diagnostic *diagnostic)
+/* limits: of the terms that limit strain only. */
+static drape_status check_terms(const drape_system *system, bool limits, const double *given,
+                                const double *given_before, const double *internal, const char **reason,
+                                drape_diagnostic *diagnostic)
 {
     const double *x = in_space(system, system->frame_t, given, 0),
                  *before = in_space(system, system->frame_t, given_before, 2);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         drape_fault fault;
-        if (!term->ops->check || drape_summer_leaves(system->summer, term))
+        if (!term->ops->check || (limits && !term->ops->constraint) ||
+            drape_summer_leaves(system->summer, term))
             continue;
-        const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+        const double *own = drape_term_own(term, internal);
         const drape_elements el = drape_term_elements(term, system->frame_t);
         drape_status status = term->ops->check(&el, x, before, own, &fault);
         if (status) {
@@ -1063,31 +1067,17 @@ static drape_status check_terms(const drape_system *system, const double *given,
 drape_status drape_system_check(drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_diagnostic *diagnostic)
 {
-    const drape_status status = check_terms(system, x, before, internal, reason, diagnostic);
+    const drape_status status = check_terms(system, false, x, before, internal, reason, diagnostic);
     return drape_agree(&system->agreed, system->model, status, reason, diagnostic);
-}
-
-static bool breaks_limit_here(const drape_system *system, const double *given, const double *given_before,
-                              const double *internal)
-{
-    const double *x = in_space(system, system->frame_t, given, 0),
-                 *before = in_space(system, system->frame_t, given_before, 2);
-    for (int32_t i = 0; i < system->model->term_count; i++) {
-        const drape_term *term = &system->model->terms[i];
-        drape_fault fault;
-        if (!term->ops->constraint || !term->ops->check || drape_summer_leaves(system->summer, term))
-            continue;
-        const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
-        if (term->ops->check(&term->elements, x, before, own, &fault))
-            return true;
-    }
-    return false;
 }
 
 bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
                                const double *internal)
 {
-    return drape_ranks_any(system->ranks, breaks_limit_here(system, x, before, internal));
+    const char *reason;
+    drape_diagnostic diagnostic;
+    return drape_ranks_any(system->ranks,
+                           check_terms(system, true, x, before, internal, &reason, &diagnostic));
 }
 
 void drape_system_agree_largest(drape_system *system, double value, drape_diagnostic *diagnostic)

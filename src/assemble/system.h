@@ -135,8 +135,8 @@ drape_status drape_system_continue(drape_system *system, drape_system *from, con
 /* Begins a step at a state, against which contact compares until the next call. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
-/* For forces in a state that no step has led to: begins one there, unless that is where one has begun that
- * failed, which must not make contact stiffer, and ends it. Errors: DRAPE_E_MEMORY. */
+/* For forces in a state that no step has led to: begins a step there and ends it, unless a step that failed
+ * has begun there; beginning another one would make contact stiffer. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin_reading(drape_system *system, const drape_state *at);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
@@ -148,7 +148,7 @@ void drape_system_end_step(drape_system *system);
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
-/* Differs after each change of the pattern, for whoever has a matrix in it and is not the only one. */
+/* Differs after each change of the pattern: for several owners of matrices in it. */
 int64_t drape_system_pattern_version(const drape_system *system);
 
 /* From now on the pattern is without what only these terms (term_count) couple, which no matrix in it may
@@ -160,11 +160,11 @@ drape_status drape_system_leave_out(drape_system *system, const bool *terms);
  * contacts, or cancelled. */
 drape_status drape_system_status(const drape_system *system);
 
-/* Where ranks share the model: that of the lowest rank that has one, for all. Collective. */
+/* Where ranks share the model: the status of the lowest rank that has failed, on all ranks. Collective. */
 drape_status drape_system_agree(drape_system *system);
 
-/* Whether these numbers, of which each rank has some, are all finite. Unless they are and no rank has a
- * status, that is agreed on, too: with one exchange while all is well. Collective. */
+/* Whether these numbers, of which each rank has some, are all finite. It takes one exchange while all is
+ * well, and else agrees on a status, too. Collective. */
 bool drape_system_agree_finite(drape_system *system, const double *f, size_t count);
 
 /* g (node_count x 3) of all nodes, including pinned ones; without what lies along the directions in which

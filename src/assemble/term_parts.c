@@ -105,7 +105,7 @@ void drape_parts_measure(const drape_term *term, const drape_request *want, int3
     const drape_parts *p = el.parts;
     const int32_t first = block * DRAPE_BLOCK,
                   last = first + DRAPE_BLOCK < p->count ? first + DRAPE_BLOCK : p->count;
-    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    const double *internal = drape_term_own(term, want->point->internal);
     const bool turns = want->hessian && drape_block_is_nonsymmetric(term, want);
     const bool rates = drape_block_has_rates(term) && !want->point->history && want->point->v;
     for (int32_t i = first; i < last; i += LANES) {
@@ -219,7 +219,7 @@ void drape_parts_evaluate(const drape_term *term, const drape_request *want, con
     const drape_elements el = drape_term_elements(term, want->point->t + want->point->ahead);
     const drape_parts *p = el.parts;
     const int d = 3 * p->nodes;
-    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    const double *internal = drape_term_own(term, want->point->internal);
     b->pairs = false;
     b->mirrored = true;
     b->stride = LANES;

@@ -28,10 +28,10 @@ static drape_status build(const drape_seam_view *seam, const double *values, dra
         area += seam->cloth[side]->node_area[seam->pair[i] - seam->first_node[side]] / (2 * seam->pair_count);
     }
     const double rest[REST_COUNT] = {[REST_COEFFICIENT] = *values, [REST_SMOOTHING] = SHARE * sqrt(area)};
-    const drape_status status = drape_term_reserve(builder, seam->pair_count, REST_COUNT);
-    for (int32_t i = 0; !status && i < seam->pair_count; i++)
+    DRAPE_TRY(drape_term_reserve(builder, seam->pair_count, REST_COUNT));
+    for (int32_t i = 0; i < seam->pair_count; i++)
         drape_term_set(builder, i, seam->pair + 2 * (size_t)i, rest);
-    return status;
+    return DRAPE_OK;
 }
 
 static void dissipation(const drape_elements *el, int32_t first, int32_t count, const double *x,

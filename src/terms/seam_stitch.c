@@ -38,8 +38,8 @@ static drape_status build(const drape_seam_view *seam, const double *values, dra
                                  "with \"closing\": 0 the seam is closed from the beginning: \"start\" "
                                  "must be 0");
     drape_term_timed(builder, values[START], values[START] + values[CLOSING]);
-    drape_status status = drape_term_reserve(builder, seam->pair_count, REST_COUNT);
-    for (int32_t i = 0; !status && i < seam->pair_count; i++) {
+    DRAPE_TRY(drape_term_reserve(builder, seam->pair_count, REST_COUNT));
+    for (int32_t i = 0; i < seam->pair_count; i++) {
         const int32_t *node = seam->pair + 2 * (size_t)i;
         double d[3];
         vec3_sub(seam->cloth[1]->rest + 3 * (size_t)(node[1] - seam->first_node[1]),
@@ -48,7 +48,7 @@ static drape_status build(const drape_seam_view *seam, const double *values, dra
         drape_term_set(builder, i, node, rest);
         drape_term_sew(builder, node[0], node[1]);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void stitch(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
@@ -74,12 +74,7 @@ static void stitch(const drape_elements *el, int32_t element, const double *x, d
         drape_pair_block(h, hess);
 }
 
-static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                   const double *internal, double *e, double *g, double *hess)
-{
-    (void)internal;
-    drape_energy_range(el, first, count, x, e, g, hess, stitch);
-}
+DRAPE_ENERGY_BY(stitch)
 
 const drape_term_ops drape_seam_stitch = {
     .struct_size = sizeof(drape_term_ops),

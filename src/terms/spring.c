@@ -86,8 +86,8 @@ drape_status drape_spring_build(const drape_spring_set *set, const double *value
                                  values[DRAPE_SPRING_GRADIENT]);
     const int32_t count = drape_spring_count(set), columns = set->cloth->columns;
     const double gradient = values[DRAPE_SPRING_GRADIENT];
-    drape_status status = drape_term_reserve(builder, count, REST_COUNT);
-    for (int32_t i = 0; !status && i < count; i++) {
+    DRAPE_TRY(drape_term_reserve(builder, count, REST_COUNT));
+    for (int32_t i = 0; i < count; i++) {
         int32_t pair[2];
         drape_spring_pair(set, i, pair);
         double k = values[DRAPE_SPRING_STIFFNESS] * values[DRAPE_SPRING_FACTOR];
@@ -101,7 +101,7 @@ drape_status drape_spring_build(const drape_spring_set *set, const double *value
                                    [REST_DAMPING] = values[DRAPE_SPRING_DAMPING]};
         drape_term_set(builder, i, pair, rest);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,

@@ -24,11 +24,9 @@ void drape_strain_weights(const double l[3], const double flat[6], double w[3])
 static double ratio_of(const drape_elements *el, int32_t element, const double *x)
 {
     const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
-    double d1[3], d2[3], normal[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d1);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], d2);
-    vec3_cross(d1, d2, normal);
-    return vec3_norm(normal) / 2 / drape_rest_of(el, DRAPE_STRAIN_AREA, element);
+    double area[3];
+    vec3_triangle_area(node, x, area);
+    return vec3_norm(area) / 2 / drape_rest_of(el, DRAPE_STRAIN_AREA, element);
 }
 
 drape_status drape_strain_check(const drape_elements *el, const double *x, const double *before,

@@ -9,8 +9,8 @@
 #include <stdbool.h>
 #include <string.h>
 
-/* Strains this small are rounding: a sheet at rest is taut, so that it has its stiffness. Coordinates are
- * some hundred times as large as an edge, and so are their rounding errors relative to it. */
+/* Strains this small are rounding errors: a sheet at rest counts as taut, and has its stiffness. Coordinates
+ * are up to some hundred edges, and so are their rounding errors relative to an edge. */
 #define ROUNDING (512 * DBL_EPSILON)
 
 #define DIRECTIONS 16 /* in which the wrinkles are sought first, in half a turn */

@@ -55,15 +55,15 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 {
     const double mass = values[PARAM_COEFFICIENT] * values[PARAM_DENSITY] * values[PARAM_SPAN],
                  *wind = values + PARAM_WIND;
-    drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
-    for (int32_t i = 0; !status && i < cloth->triangle_count; i++) {
+    DRAPE_TRY(drape_term_reserve(builder, cloth->triangle_count, REST_COUNT));
+    for (int32_t i = 0; i < cloth->triangle_count; i++) {
         int edges = 0;
         for (int k = 0; values[PARAM_WAKE] != 0 && k < 3; k++)
             edges |= drape_on_boundary(cloth, cloth->triangle_edge[3 * (size_t)i + (size_t)k]) << k;
         drape_term_set(builder, i, cloth->triangle + 3 * (size_t)i,
                        (const double[REST_COUNT]){mass, wind[0], wind[1], wind[2], edges});
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* One triangle: m_a, the edges opposite its nodes, m, |m|, r and q; or a change of it. */

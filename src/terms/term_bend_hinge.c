@@ -71,11 +71,7 @@ LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t
         drape_dihedral_hessian(&h, ddq);
 }
 
-static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                    const double *internal, double *q, double *dq, double *ddq)
-{
-    drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
-}
+DRAPE_MEASURE_BY(measure_lanes)
 
 /* Altitudes and angles of LANES hinges from `first` on; lanes beyond the end repeat the last one. */
 typedef struct shapes {
@@ -124,15 +120,15 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     for (int32_t e = 0; cloth->edge_image && e < cloth->edge_count; e++)
         count += cloth->edge_image[e] > e;
     const bool periodic = count > cloth->hinge_count;
-    drape_status status = drape_term_reserve(builder, count, periodic ? REST_PERIODIC : REST_COUNT);
-    if (!status && periodic)
+    DRAPE_TRY(drape_term_reserve(builder, count, periodic ? REST_PERIODIC : REST_COUNT));
+    if (periodic)
         drape_term_anchor(builder);
-    for (int32_t i = 0; !status && i < cloth->hinge_count; i++) {
+    for (int32_t i = 0; i < cloth->hinge_count; i++) {
         const int32_t edge = cloth->hinge_edge[i];
         set_hinge(cloth, values, i, edge, cloth->edge_triangle + 2 * (size_t)edge,
                   cloth->hinge + 4 * (size_t)i, none, none, builder);
     }
-    for (int32_t e = 0, i = cloth->hinge_count; !status && i < count; e++) {
+    for (int32_t e = 0, i = cloth->hinge_count; i < count; e++) {
         if (cloth->edge_image[e] <= e)
             continue;
         const int32_t *end = cloth->edge + 2 * (size_t)e, triangle = cloth->edge_triangle[2 * (size_t)e],
@@ -143,7 +139,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         set_hinge(cloth, values, i++, e, (const int32_t[]){triangle, other.triangle}, node, other.at_rest,
                   other.shift, builder);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* after: the angle at x, on the branch nearest to before. */

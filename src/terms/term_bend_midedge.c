@@ -185,8 +185,9 @@ static bool is_own(const drape_midedge *patch, int h)
     return is_clamped(patch, h) || (patch->shifted[h] && is_linked(patch, h));
 }
 
-/* The nodes of hinge h of a patch as those of a part: of a clamped one its edge, its apex and again the
- * first. Returns the sign of its angle in the patch, which depends on the orientation of the triangle. */
+/* The nodes of hinge h of a patch as those of a part; a clamped hinge has its edge, its apex and again the
+ * first node of the edge. Returns the sign of its angle in the patch, which depends on the orientation of
+ * the triangle. */
 static int part_nodes(const drape_cloth_view *cloth, const drape_midedge *patch, int h, int32_t node[4])
 {
     const int *local = drape_patch_hinge[h];
@@ -230,8 +231,7 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
     int most = 3; /* nodes per element */
     bool shifted = false;
     drape_midedge patch;
-    drape_status status = DRAPE_OK;
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
         int32_t node[MIDEDGE_NODES];
         if (!drape_midedge_of(cloth, t, values, law, &patch))
             return drape_orthotropic_refuse(builder, t);
@@ -245,7 +245,7 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
         for (int r = 0; r < patch.rank; r++)
             for (int h = 0; h < MIDEDGE_HINGES; h++)
                 links += patch.c[r][h] != 0;
-        status = drape_term_check_cancel(builder, 4096);
+        DRAPE_TRY(drape_term_check_cancel(builder, 4096));
     }
     if (links > INT32_MAX || parts > INT32_MAX)
         return drape_term_refuse(builder, "the mesh is too large: %.0f angles in elements; at most %d",
@@ -253,12 +253,11 @@ static drape_status reserve(const drape_cloth_view *cloth, const double *values,
     const bool own = parts > cloth->hinge_count;
     if (own)
         drape_term_anchor(builder);
-    status = status ? status : drape_term_reserve_nodes(builder, (int32_t)squares, most, REST_COUNT);
-    return status ? status
-                  : drape_term_reserve_parts(builder, (int32_t)parts, (int32_t)links,
-                                             !own      ? 0
-                                             : shifted ? PART_COUNT
-                                                       : CLAMP_COUNT);
+    DRAPE_TRY(drape_term_reserve_nodes(builder, (int32_t)squares, most, REST_COUNT));
+    return drape_term_reserve_parts(builder, (int32_t)parts, (int32_t)links,
+                                    !own      ? 0
+                                    : shifted ? PART_COUNT
+                                              : CLAMP_COUNT);
 }
 
 static double min_altitude(const double *x0, const double *x1, const double *x2)
@@ -271,8 +270,8 @@ static double min_altitude(const double *x0, const double *x1, const double *x2)
     return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
 }
 
-/* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next one that
- * is its own. */
+/* Sets the parts of a patch: their numbers, signs and angles at rest. next: the number of the next part
+ * that no other patch has set. */
 static void set_parts(const drape_cloth_view *cloth, const drape_midedge *patch, int32_t *next,
                       drape_term_builder *builder, int32_t part[MIDEDGE_HINGES], int sign[MIDEDGE_HINGES],
                       double theta[MIDEDGE_HINGES])
@@ -385,13 +384,12 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                                      "a bending stiffness of %g N m is too small to be computed with; it is "
                                      "at least %g N m",
                                      law[4 * i], LEAST_STIFFNESS);
-    drape_status status = hysteresis_of(values, law, builder, &slides);
-    if (!status)
-        status = reserve(cloth, values, law, builder);
-    if (!status && slides.count > 0)
-        status = drape_term_reserve_sliders(builder, slides.count);
+    DRAPE_TRY(hysteresis_of(values, law, builder, &slides));
+    DRAPE_TRY(reserve(cloth, values, law, builder));
+    if (slides.count > 0)
+        DRAPE_TRY(drape_term_reserve_sliders(builder, slides.count));
     int32_t element = 0, next = cloth->hinge_count;
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
         drape_midedge patch;
         int32_t part[MIDEDGE_HINGES], node[MIDEDGE_NODES];
         int sign[MIDEDGE_HINGES];
@@ -422,9 +420,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                 drape_term_set_slider(builder, s, element, slides.stiffness[s] * patch.k[r],
                                       slides.limit[s] * patch.k[r]);
         }
-        status = drape_term_check_cancel(builder, 4096);
+        DRAPE_TRY(drape_term_check_cancel(builder, 4096));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Internal variables ---- */

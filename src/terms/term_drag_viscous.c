@@ -23,16 +23,16 @@ static const drape_param params[PARAM_COUNT] = {
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_term_reserve(builder, cloth->node_count, 1);
+    DRAPE_TRY(drape_term_reserve(builder, cloth->node_count, 1));
     double mean = 0;
     for (int32_t i = 0; i < cloth->node_count; i++)
         mean += cloth->node_area[i] / cloth->node_count;
-    for (int32_t i = 0; !status && i < cloth->node_count; i++) {
+    for (int32_t i = 0; i < cloth->node_count; i++) {
         double area = values[PARAM_AREA] == AREA_UNIFORM ? mean : cloth->node_area[i];
         double rest = values[PARAM_COEFFICIENT] * area;
         drape_term_set(builder, i, &i, &rest);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void dissipation(const drape_elements *el, int32_t first, int32_t count, const double *x,

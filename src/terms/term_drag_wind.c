@@ -58,12 +58,12 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     double factor = density * values[PARAM_COEFFICIENT];
     if (values[PARAM_LAW] == PLATE)
         factor *= 4 + DRAPE_PI;
-    drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
-    for (int32_t i = 0; !status && i < cloth->triangle_count; i++)
+    DRAPE_TRY(drape_term_reserve(builder, cloth->triangle_count, REST_COUNT));
+    for (int32_t i = 0; i < cloth->triangle_count; i++)
         drape_term_set(
             builder, i, cloth->triangle + 3 * (size_t)i,
             (const double[REST_COUNT]){factor, wind[0], wind[1], wind[2], density * values[PARAM_FRICTION]});
-    return status;
+    return DRAPE_OK;
 }
 
 /* One triangle: its edges, m and |m|^2, u and q. */

@@ -7,13 +7,13 @@ enum { REST_FORCE_X, REST_FORCE_Y, REST_FORCE_Z, REST_COUNT };
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     (void)values;
-    drape_status status = drape_term_reserve(builder, cloth->node_count, REST_COUNT);
-    for (int32_t i = 0; !status && i < cloth->node_count; i++) {
+    DRAPE_TRY(drape_term_reserve(builder, cloth->node_count, REST_COUNT));
+    for (int32_t i = 0; i < cloth->node_count; i++) {
         double m = cloth->node_mass[i];
         double force[REST_COUNT] = {m * cloth->gravity[0], m * cloth->gravity[1], m * cloth->gravity[2]};
         drape_term_set(builder, i, &i, force);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

@@ -81,15 +81,15 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has only edges");
     int32_t count = drape_spring_count(&set);
     double stiffness = stiffness_of(&set, count, values);
-    drape_status status = drape_term_reserve(builder, count, REST_COUNT);
-    for (int32_t i = 0; !status && i < count; i++) {
+    DRAPE_TRY(drape_term_reserve(builder, count, REST_COUNT));
+    for (int32_t i = 0; i < count; i++) {
         int32_t pair[2];
         drape_spring_pair(&set, i, pair);
         double rest[REST_COUNT] = {
             [REST_K] = stiffness, [REST_LENGTH] = drape_spring_rest_length(cloth, pair)};
         drape_term_set(builder, i, pair, rest);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- The barrier ---- */
@@ -145,12 +145,7 @@ static void one(const drape_elements *el, int32_t element, const double *x, doub
         drape_pair_block(block, hess);
 }
 
-static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                   const double *internal, double *e, double *g, double *hess)
-{
-    (void)internal;
-    drape_energy_range(el, first, count, x, e, g, hess, one);
-}
+DRAPE_ENERGY_BY(one)
 
 static double strain_of(const drape_elements *el, int32_t e, const double *x)
 {

@@ -26,13 +26,12 @@ static const drape_param params[PARAM_COUNT] = {
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_load_check_faces(cloth, builder);
     (void)values;
-    if (!status)
-        status = drape_term_reserve(builder, cloth->triangle_count, 0);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++)
+    DRAPE_TRY(drape_load_check_faces(cloth, builder));
+    DRAPE_TRY(drape_term_reserve(builder, cloth->triangle_count, 0));
+    for (int32_t t = 0; t < cloth->triangle_count; t++)
         drape_term_set(builder, t, cloth->triangle + 3 * (size_t)t, NULL);
-    return status;
+    return DRAPE_OK;
 }
 
 /* The same 3 x 9 rows for each node: m = X0 x X1 + X1 x X2 + X2 x X0, so that dm/dX_a turns dX_a about the

@@ -18,10 +18,9 @@ static const drape_param params[LIST_COUNT] = {
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     int32_t count, next = 0;
-    drape_status status = drape_load_count(cloth, values, builder, &count);
-    if (!status)
-        status = drape_term_reserve(builder, count, REST_COUNT);
-    for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
+    DRAPE_TRY(drape_load_count(cloth, values, builder, &count));
+    DRAPE_TRY(drape_term_reserve(builder, count, REST_COUNT));
+    for (int32_t e = 0; e < cloth->edge_count; e++) {
         double half[REST_COUNT];
         if (!drape_load_takes(cloth, values, e))
             continue;
@@ -29,7 +28,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             half[k] = values[PARAM_FORCE + k] * cloth->edge_length[e] / 2;
         drape_term_set(builder, next++, cloth->edge + 2 * (size_t)e, half);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

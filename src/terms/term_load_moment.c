@@ -167,8 +167,7 @@ typedef struct twist {
 static double measure_twist(const drape_elements *el, int32_t element, const double *x, twist *w)
 {
     const int32_t *node = el->node + 3 * (size_t)element;
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], w->d);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], w->g);
+    vec3_triangle_sides(node, x, w->d, w->g);
     for (int i = 0; i < 3; i++) {
         w->t0[i] = drape_rest_of(el, REST_TANGENT + i, element);
         w->n0[i] = drape_rest_of(el, REST_NORMAL + i, element);
@@ -241,27 +240,24 @@ static void put_hessian(const twist *w, double scale, double *hess)
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     int32_t count, next = 0;
-    drape_status status = drape_load_check_faces(cloth, builder);
-    if (!status)
-        status = drape_load_count(cloth, values, builder, &count);
-    if (!status)
-        status = drape_term_reserve(builder, count, REST_COUNT);
-    for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
+    DRAPE_TRY(drape_load_check_faces(cloth, builder));
+    DRAPE_TRY(drape_load_count(cloth, values, builder, &count));
+    DRAPE_TRY(drape_term_reserve(builder, count, REST_COUNT));
+    for (int32_t e = 0; e < cloth->edge_count; e++) {
         int32_t node[3];
         double rest[REST_COUNT] = {values[PARAM_MOMENT] * cloth->edge_length[e]}, d[3], g[3];
         direction t, n;
         if (!drape_load_takes(cloth, values, e))
             continue;
         corners(cloth, e, node);
-        vec3_sub(cloth->rest + 3 * (size_t)node[1], cloth->rest + 3 * (size_t)node[0], d);
-        vec3_sub(cloth->rest + 3 * (size_t)node[2], cloth->rest + 3 * (size_t)node[0], g);
+        vec3_triangle_sides(node, cloth->rest, d, g);
         measure_tangent(d, g, &t);
         measure_normal(d, g, &n);
         memcpy(rest + REST_TANGENT, t.unit, sizeof t.unit);
         memcpy(rest + REST_NORMAL, n.unit, sizeof n.unit);
         drape_term_set(builder, next++, node, rest);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

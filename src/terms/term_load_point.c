@@ -35,11 +35,11 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         count += takes(cloth, values, i);
     if (count == 0)
         return drape_term_refuse(builder, "no such node of the mesh lies in the box");
-    drape_status status = drape_term_reserve(builder, count, 0);
-    for (int32_t i = 0; !status && i < cloth->node_count; i++)
+    DRAPE_TRY(drape_term_reserve(builder, count, 0));
+    for (int32_t i = 0; i < cloth->node_count; i++)
         if (takes(cloth, values, i))
             drape_term_set(builder, next++, &i, NULL);
-    return status;
+    return DRAPE_OK;
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,

@@ -50,17 +50,16 @@ static bool is_repeated(const drape_cloth_view *cloth)
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_load_check_faces(cloth, builder);
     (void)values;
-    if (!status && is_repeated(cloth))
-        status =
-            drape_term_refuse(builder, "its volume ends at periodic edges that are apart, where its forces "
-                                       "would be wrong: \"load.follower\" has the right ones");
-    if (!status)
-        status = drape_term_reserve(builder, cloth->triangle_count, 0);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++)
+    DRAPE_TRY(drape_load_check_faces(cloth, builder));
+    if (is_repeated(cloth))
+        return drape_term_refuse(builder,
+                                 "its volume ends at periodic edges that are apart, where its forces "
+                                 "would be wrong: \"load.follower\" has the right ones");
+    DRAPE_TRY(drape_term_reserve(builder, cloth->triangle_count, 0));
+    for (int32_t t = 0; t < cloth->triangle_count; t++)
         drape_term_set(builder, t, cloth->triangle + 3 * (size_t)t, NULL);
-    return status;
+    return DRAPE_OK;
 }
 
 /* h (9 x 9): the block of corner a and its next corner b is -s times the derivative of X_b x X_c by X_b, c

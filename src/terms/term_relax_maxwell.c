@@ -27,16 +27,15 @@ static const drape_param params[2 * BRANCHES] = {
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     (void)cloth;
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < BRANCHES; i++) {
+    for (int i = 0; i < BRANCHES; i++) {
         const double fraction = values[2 * i], time = values[2 * i + 1];
         if (isnan(fraction) != isnan(time))
             return drape_term_refuse(builder, "\"%s\" is given without \"%s\"",
                                      params[2 * i + isnan(fraction)].name, params[2 * i + isnan(time)].name);
         if (!isnan(fraction))
-            status = drape_term_add_branch(builder, fraction, time);
+            DRAPE_TRY(drape_term_add_branch(builder, fraction, time));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void law(const double *values, int32_t count, const double *k, const double *strain,

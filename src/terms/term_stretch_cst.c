@@ -84,11 +84,7 @@ LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t
         hessian_lanes(w, ddq);
 }
 
-static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                    const double *internal, double *q, double *dq, double *ddq)
-{
-    drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
-}
+DRAPE_MEASURE_BY(measure_lanes)
 
 /* W of L+ if the force is a tension, of L- = L - L+ if it is a compression. */
 static void positive(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -124,8 +120,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / 3);
     drape_strain_law(cloth, values, c, k, l);
-    drape_status status = drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+    DRAPE_TRY(drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT));
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
         const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                                          cloth->rest + 3 * (size_t)node[2]};
@@ -147,7 +143,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                                            area, w[0], w[1], w[2], tension[0], tension[1], tension[2]});
         }
     }
-    return status;
+    return DRAPE_OK;
 }
 
 const drape_term_ops drape_term_stretch_cst = {

@@ -104,14 +104,14 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     if (cloth->triangle_count > INT32_MAX / responses)
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / responses);
-    drape_status status = drape_term_reserve(builder, responses * cloth->triangle_count, REST_COUNT);
-    if (!status && friction > 0)
-        status = drape_term_reserve_sliders(builder, 1);
-    const double *table = status ? NULL : make_tables(cloth, builder, at);
-    if (!status && !table)
-        status = DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_term_reserve(builder, responses * cloth->triangle_count, REST_COUNT));
+    if (friction > 0)
+        DRAPE_TRY(drape_term_reserve_sliders(builder, 1));
+    const double *table = make_tables(cloth, builder, at);
+    if (!table)
+        return DRAPE_E_MEMORY;
     memcpy(direction + DRAPE_ORTHOTROPIC_DIRECTION, values + PARAM_DIRECTION, 3 * sizeof *direction);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
         const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                                          cloth->rest + 3 * (size_t)node[2]};
@@ -139,7 +139,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             drape_term_set_slider(builder, 0, responses * t + FRICTION, area * friction / slips_at,
                                   area * friction);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- The strain of a response ---- */
@@ -152,8 +152,7 @@ typedef struct strain {
 static void sides(const drape_elements *el, int32_t element, const double *x, double d1[3], double d2[3])
 {
     const int32_t *node = el->node + 3 * (size_t)element;
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d1);
-    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], d2);
+    vec3_triangle_sides(node, x, d1, d2);
 }
 
 /* The unit vector along w1 d1 + w2 d2; returns the length. A collapsed one has no direction: 0. */

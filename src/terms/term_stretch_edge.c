@@ -46,14 +46,14 @@ static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, dou
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_term_reserve(builder, cloth->edge_count, REST_COUNT);
-    for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
+    DRAPE_TRY(drape_term_reserve(builder, cloth->edge_count, REST_COUNT));
+    for (int32_t e = 0; e < cloth->edge_count; e++) {
         double rest[REST_COUNT] = {[REST_K] = element_stiffness(cloth, e, values[PARAM_STIFFNESS]),
                                    [REST_Q0] = 0,
                                    [REST_INVERSE_LENGTH] = 1 / cloth->edge_length[e]};
         drape_term_set(builder, e, cloth->edge + 2 * (size_t)e, rest);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,

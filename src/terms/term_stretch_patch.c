@@ -44,7 +44,8 @@ enum {
     REST_COUNT = REST_POSITIVE + WEIGHTS
 };
 
-#define MISSING 1e6 /* cost of a second derivative that nodes do not determine, over one that they do */
+/* Cost of a second derivative that the nodes do not determine, relative to one that they do. */
+#define MISSING 1e6
 
 static const drape_param params[DRAPE_STRAIN_LIST] = {DRAPE_STRAIN_PARAMS};
 
@@ -109,11 +110,7 @@ LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t
         }
 }
 
-static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                    const double *internal, double *q, double *dq, double *ddq)
-{
-    drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
-}
+DRAPE_MEASURE_BY(measure_lanes)
 
 /* The positive part of W if the force is a tension, the rest of it if it is a compression. */
 static void positive(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -126,7 +123,7 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
             const double plus = drape_rest_of(el, REST_POSITIVE + k, first + i);
             w[k] = force[i] > 0 ? plus : drape_rest_of(el, REST_W + k, first + i) - plus;
         }
-        /* W of all nodes from those of nodes 1 ... 5. */
+        /* W of all nodes, from W of nodes 1 ... 5. */
         memset(full, 0, NODES * NODES * sizeof *full);
         for (int a = 1; a < NODES; a++)
             for (int b = 1; b < NODES; b++) {
@@ -354,8 +351,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / 3);
     drape_strain_law(cloth, values, c, k, l);
-    drape_status status = drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT);
-    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+    DRAPE_TRY(drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT));
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const double *corner[3];
         double axes[6], flat[6], w[NODES * NODES];
         int32_t node[NODES];
@@ -375,7 +372,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                        cloth->triangle_area[t]);
         }
     }
-    return status;
+    return DRAPE_OK;
 }
 
 const drape_term_ops drape_term_stretch_patch = {

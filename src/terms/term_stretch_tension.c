@@ -14,7 +14,7 @@
 
 #include <string.h>
 
-/* REST_11 and so on: 2 E + 1 as they come out at rest, so that there is no force there. */
+/* REST_11 and so on: 2 E + 1 at rest, with its rounding errors, so that the force at rest is exactly 0. */
 enum { REST_AREA, REST_P1, REST_P2, REST_Q1, REST_Q2, REST_11, REST_22, REST_12, REST_COUNT };
 
 static const drape_param params[DRAPE_ORTHOTROPIC_DIRECTION + 1] = {DRAPE_ORTHOTROPIC_PARAMS(
@@ -32,10 +32,10 @@ static void columns(double w[2][3], const double *x, double p[3], double q[3])
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
-    drape_status status = drape_term_reserve(builder, cloth->triangle_count, REST_COUNT);
-    double *c = status ? NULL : drape_term_share(builder, 9);
+    DRAPE_TRY(drape_term_reserve(builder, cloth->triangle_count, REST_COUNT));
+    double *c = drape_term_share(builder, 9);
     if (!c)
-        return status ? status : DRAPE_E_MEMORY;
+        return DRAPE_E_MEMORY;
     drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
                           cloth->material->poisson_ratio, c);
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
@@ -60,7 +60,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                                                   [REST_22] = vec3_dot(q, q),
                                                   [REST_12] = vec3_dot(p, q)});
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static void triangle(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
@@ -105,12 +105,7 @@ static void triangle(const drape_elements *el, int32_t element, const double *x,
     }
 }
 
-static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                   const double *internal, double *e, double *g, double *hess)
-{
-    (void)internal;
-    drape_energy_range(el, first, count, x, e, g, hess, triangle);
-}
+DRAPE_ENERGY_BY(triangle)
 
 const drape_term_ops drape_term_stretch_tension = {
     .struct_size = sizeof(drape_term_ops),

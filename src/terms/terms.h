@@ -12,6 +12,22 @@ extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
 extern const drape_term_ops *const drape_seams[]; /* NULL-ended */
 extern const drape_registry drape_term_registry, drape_seam_registry;
 
+/* Define the function `measure` or `energy` of a term by one for DRAPE_LANES elements, or for one element
+ * (drape_measure_range, drape_energy_range). */
+#define DRAPE_MEASURE_BY(lanes)                                                                              \
+    static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,             \
+                        const double *internal, double *q, double *dq, double *ddq)                          \
+    {                                                                                                        \
+        drape_measure_range(el, first, count, x, internal, q, dq, ddq, lanes);                               \
+    }
+#define DRAPE_ENERGY_BY(one)                                                                                 \
+    static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,              \
+                       const double *internal, double *e, double *g, double *hess)                           \
+    {                                                                                                        \
+        (void)internal;                                                                                      \
+        drape_energy_range(el, first, count, x, e, g, hess, one);                                            \
+    }
+
 /* drape_check_cancel_after, for builders of elements that take long. */
 drape_status drape_term_check_cancel(drape_term_builder *builder, size_t work);
 
