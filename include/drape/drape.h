@@ -1234,8 +1234,8 @@ typedef struct drape_statistics {
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
 /* The reasons why attempts were rejected, with their counts: "max_iterations", "line_search", "edge_collapse"
- * ...; all reasons after the 31st are counted as "other". index starts at 0; past the last reason *count is 0
- * and the result is NULL. */
+ * ...; those of user-defined terms after the 31st are counted as "other". index starts at 0; past the last
+ * reason *count is 0 and the result is NULL. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
 /* A doubt about a run: what is unusual, and which setting would help. */

@@ -1,8 +1,6 @@
 /* agree.c: see agree.h. */
 #include "assemble/agree.h"
 
-#include "base/reason.h"
-
 #include <stdio.h>
 #include <string.h>
 
@@ -45,7 +43,7 @@ static void tell(const drape_ranks *ranks, int from, drape_agreed *agreed, findi
 }
 
 drape_status drape_agree(drape_agreed *agreed, const drape_model *model, drape_status status,
-                         const char **reason, drape_diagnostic *diagnostic)
+                         drape_reason *reason, drape_diagnostic *diagnostic)
 {
     const drape_ranks *ranks = drape_model_ranks(model);
     if (!ranks || !drape_ranks_any(ranks, status != DRAPE_OK))
@@ -55,13 +53,11 @@ drape_status drape_agree(drape_agreed *agreed, const drape_model *model, drape_s
     if (from == ranks->rank) {
         f = finding_of(model, diagnostic);
         f.status = status;
-        int32_t i = 0;
-        while (i < DRAPE_REASON_OTHER && strcmp(drape_reason_name((drape_reason)i), *reason) != 0)
-            i++;
-        f.reason = i;
+        /* other ranks do not know the reasons of user-defined terms here */
+        f.reason = *reason < DRAPE_REASON_COUNT ? *reason : DRAPE_REASON_OTHER;
     }
     tell(ranks, from, agreed, &f, diagnostic);
-    *reason = drape_reason_name((drape_reason)f.reason);
+    *reason = (drape_reason)f.reason;
     return (drape_status)f.status;
 }
 

@@ -3,6 +3,7 @@
 #ifndef DRAPE_ASSEMBLE_AGREE_H
 #define DRAPE_ASSEMBLE_AGREE_H
 
+#include "base/reason.h"
 #include "model/model.h"
 
 /* The texts of a diagnostic that another rank found: valid until the next one. */
@@ -13,7 +14,7 @@ typedef struct drape_agreed {
 /* The status of the lowest rank that has one other than DRAPE_OK, with its reason and its diagnostic, whose
  * nodes and element become those of the whole model. */
 drape_status drape_agree(drape_agreed *agreed, const drape_model *model, drape_status status,
-                         const char **reason, drape_diagnostic *diagnostic);
+                         drape_reason *reason, drape_diagnostic *diagnostic);
 
 /* The diagnostic of the rank with the largest value, likewise; -INFINITY: it has none. Returns that value. */
 double drape_agree_largest(drape_agreed *agreed, const drape_model *model, double value,

@@ -31,6 +31,8 @@ struct drape_system {
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
     const bool *left_out;         /* (term_count) terms without slots in it; NULL: none */
     drape_status status;          /* of drape_system_status */
+    const char *own_reasons[DRAPE_OWN_REASONS]; /* of user-defined terms: static texts */
+    int own_reason_count;
     drape_motion *motion;
     drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
@@ -385,7 +387,7 @@ void drape_system_carry_layers(drape_system *system, double t, double *y)
         drape_contact_carry_layers(system->contact, t, y);
 }
 
-bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
+bool drape_system_crosses(drape_system *system, const double *x, double t, drape_reason *reason,
                           drape_diagnostic *diagnostic)
 {
     if (!system->contact)
@@ -410,7 +412,7 @@ double drape_system_take_contact_work(drape_system *system)
     return system->contact ? drape_contact_take_work(system->contact) : 0;
 }
 
-drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
+drape_status drape_system_check_contact(drape_system *system, const double *x, double t, drape_reason *reason,
                                         drape_diagnostic *diagnostic)
 {
     if (!system->contact)
@@ -1031,6 +1033,27 @@ void drape_system_stress(drape_system *system, const drape_point *given, const d
 
 /* ---- Checks ---- */
 
+drape_reason drape_system_reason(drape_system *s, const char *name)
+{
+    const drape_reason known = drape_reason_named(name);
+    if (known < DRAPE_REASON_COUNT)
+        return known;
+    int i = 0;
+    while (i < s->own_reason_count && strcmp(s->own_reasons[i], name) != 0)
+        i++;
+    if (i == DRAPE_OWN_REASONS)
+        return DRAPE_REASON_OTHER;
+    if (i == s->own_reason_count)
+        s->own_reasons[s->own_reason_count++] = name;
+    return (drape_reason)(DRAPE_REASON_COUNT + i);
+}
+
+const char *drape_system_reason_name(const drape_system *s, drape_reason reason)
+{
+    return reason < DRAPE_REASON_COUNT ? drape_reason_name(reason)
+                                       : s->own_reasons[reason - DRAPE_REASON_COUNT];
+}
+
 /* limits: of the terms that limit strain only. */
 static drape_status check_terms(const drape_system *system, bool limits, const double *given,
                                 const double *given_before, const double *internal, const char **reason,
@@ -1065,9 +1088,12 @@ static drape_status check_terms(const drape_system *system, bool limits, const d
 }
 
 drape_status drape_system_check(drape_system *system, const double *x, const double *before,
-                                const double *internal, const char **reason, drape_diagnostic *diagnostic)
+                                const double *internal, drape_reason *reason, drape_diagnostic *diagnostic)
 {
-    const drape_status status = check_terms(system, false, x, before, internal, reason, diagnostic);
+    const char *name;
+    const drape_status status = check_terms(system, false, x, before, internal, &name, diagnostic);
+    if (status)
+        *reason = drape_system_reason(system, name);
     return drape_agree(&system->agreed, system->model, status, reason, diagnostic);
 }
 

@@ -289,12 +289,19 @@ void drape_system_stress(drape_system *system, const drape_point *point, const d
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
                        double *g, double *values);
 
+#define DRAPE_OWN_REASONS 31 /* of user-defined terms; any more are DRAPE_REASON_OTHER */
+
+/* The number of a reason by its name, static text, which may be that of a user-defined term; and the name of
+ * a reason by its number. */
+drape_reason drape_system_reason(drape_system *system, const char *name);
+const char *drape_system_reason_name(const drape_system *system, drape_reason reason);
+
 /* Searches all terms for an element that a step made degenerate. Returns DRAPE_OK, or
  * DRAPE_RETRY_DEGENERATE with *reason and *diagnostic filled in. x is the new state; before and
  * internal belong to the previous one. In the frame of supports both are at the time of the last evaluation.
  * before NULL: reports elements that were degenerate already, too. */
 drape_status drape_system_check(drape_system *system, const double *x, const double *before,
-                                const double *internal, const char **reason, drape_diagnostic *diagnostic);
+                                const double *internal, drape_reason *reason, drape_diagnostic *diagnostic);
 
 /* Whether x violates a limit imposed by a term with `constraint`: drape_system_check restricted to those
  * terms. */
@@ -303,7 +310,7 @@ bool drape_system_breaks_limit(const drape_system *system, const double *x, cons
 
 /* Whether features come too near at x, or pass through each other on the straight path from the beginning
  * of the step to there; with *reason and *diagnostic filled in if so. */
-bool drape_system_crosses(drape_system *system, const double *x, double t, const char **reason,
+bool drape_system_crosses(drape_system *system, const double *x, double t, drape_reason *reason,
                           drape_diagnostic *diagnostic);
 
 /* drape_contact_nearest; false without contact. */
@@ -315,7 +322,7 @@ double drape_system_take_contact_work(drape_system *system);
 /* Searches for a place where a step brought cloth into a collider or through another piece of cloth. x is
  * the new state at time t; the previous one is that of drape_system_begin. Returns DRAPE_OK, or
  * DRAPE_RETRY_REJECTED with *reason and *diagnostic filled in. */
-drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
+drape_status drape_system_check_contact(drape_system *system, const double *x, double t, drape_reason *reason,
                                         drape_diagnostic *diagnostic);
 
 /* drape_agree_largest (assemble/agree.h); the texts are valid until the next diagnostic. */

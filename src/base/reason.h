@@ -1,6 +1,7 @@
 /* reason.h: why an attempt at a step was accepted or rejected: the reasons in steps.csv, in summary.json and
  * in drape_attempt. One table has all of those that Drape itself reports, each with its meaning; `drape list
- * reasons` prints it. User-defined terms report reasons of their own. */
+ * reasons` prints it. User-defined terms report reasons of their own, which a system numbers from
+ * DRAPE_REASON_COUNT on (drape_system_reason). */
 #ifndef DRAPE_BASE_REASON_H
 #define DRAPE_BASE_REASON_H
 
@@ -64,13 +65,16 @@
     X(EVENT, "event", "the sim",                                                                             \
       "an event that acts lies within the step, which is repeated so that it ends there")                    \
     X(CANCELLED, "cancelled", "the host", "`drape_sim_cancel` was called during the attempt")                \
-    X(OTHER, "other", "statistics", "all reasons beyond the 31st")
+    X(OTHER, "other", "statistics", "all reasons of user-defined terms beyond the 31st")
 
 #define DRAPE_REASON_CONSTANT(constant, name, by, meaning) DRAPE_REASON_##constant,
 typedef enum drape_reason { DRAPE_REASONS(DRAPE_REASON_CONSTANT) DRAPE_REASON_COUNT } drape_reason;
 
 /* The name of a reason, static: "converged". */
 const char *drape_reason_name(drape_reason reason);
+
+/* The reason of that name; DRAPE_REASON_COUNT: none is called so. */
+drape_reason drape_reason_named(const char *name);
 
 extern const drape_registry
     drape_reason_registry; /* in the order of drape_reason; reference: who reports it */

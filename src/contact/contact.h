@@ -11,6 +11,7 @@
 #define DRAPE_CONTACT_CONTACT_H
 
 #include "base/archive.h"
+#include "base/reason.h"
 #include "model/motion.h"
 
 #include <stdatomic.h>
@@ -168,13 +169,13 @@ bool drape_contact_may_meet(drape_contact *contact, const double *x, const doubl
 /* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
  * path from the beginning of the step to there, while pins and colliders move straight between the kinks of
  * their motion up to time t. */
-bool drape_contact_crosses(drape_contact *contact, const double *x, double t, const char **reason,
+bool drape_contact_crosses(drape_contact *contact, const double *x, double t, drape_reason *reason,
                            drape_diagnostic *diagnostic);
 
 /* Compares the end of a step, x at time t, with its beginning: DRAPE_OK, or DRAPE_RETRY_REJECTED if a
  * pair is nearer than the least gap, and than before ("penetration"), or came nearer than half of that on
  * the path ("collision"). */
-drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
+drape_status drape_contact_check(drape_contact *contact, const double *x, double t, drape_reason *reason,
                                  drape_diagnostic *diagnostic);
 
 /* The nearest active pair at the last point: what holds a step up whose equations have no solution. */

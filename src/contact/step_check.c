@@ -143,7 +143,7 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
 
 /* What a check says: which reason, and where. */
 typedef struct verdict {
-    const char **reason;
+    drape_reason *reason;
     drape_diagnostic *diagnostic;
 } verdict;
 
@@ -153,7 +153,7 @@ static drape_status refuse(drape_contact *c, const drape_pair *pair, const verdi
 {
     c->refused = true;
     c->refusing = *pair;
-    *to->reason = drape_reason_name(reason);
+    *to->reason = reason;
     *to->diagnostic = diagnostic_of(
         c, pair, reason == DRAPE_REASON_COLLISION ? "fraction of the step before passing through" : "gap [m]",
         value, limit);
@@ -329,7 +329,7 @@ static drape_status update_at(drape_contact *c, const double *x, double t)
     return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
 }
 
-bool drape_contact_crosses(drape_contact *c, const double *x, double t, const char **reason,
+bool drape_contact_crosses(drape_contact *c, const double *x, double t, drape_reason *reason,
                            drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();
@@ -340,7 +340,7 @@ bool drape_contact_crosses(drape_contact *c, const double *x, double t, const ch
     return crosses;
 }
 
-drape_status drape_contact_check(drape_contact *c, const double *x, double t, const char **reason,
+drape_status drape_contact_check(drape_contact *c, const double *x, double t, drape_reason *reason,
                                  drape_diagnostic *diagnostic)
 {
     const double start = drape_clock_seconds();

@@ -112,7 +112,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
     if (!(error <= 1)) { /* also rejects NaN */
         const double allowed = drape_pow(error, -1.0 / (trial->order + 1)),
                      factor = isnan(error) ? 0.5 : fmax(DRAPE_STEP_CUT, DRAPE_STEP_SAFETY * allowed);
-        trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        trial->info->reason = DRAPE_REASON_ERROR_TEST;
         trial->info->diagnostic =
             (drape_diagnostic){.what = "local error / tolerance",
                                .term = "",

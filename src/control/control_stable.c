@@ -48,7 +48,7 @@ static double limit_of(drape_trial *trial)
 
 static drape_verdict reject(const double *values, drape_trial *trial, double limit)
 {
-    trial->info->reason = drape_reason_name(DRAPE_REASON_UNSTABLE);
+    trial->info->reason = DRAPE_REASON_UNSTABLE;
     trial->info->diagnostic = (drape_diagnostic){.what = "step / stable step",
                                                  .term = "",
                                                  .element = -1,

@@ -65,7 +65,7 @@ static bool too_far(const double *values, drape_trial *trial)
     bool stretched = stretch.value > stretch.limit, moved = move.value > move.limit;
     if (!stretched && !moved)
         return false;
-    trial->info->reason = drape_reason_name(stretched ? DRAPE_REASON_STRETCH : DRAPE_REASON_MOVE);
+    trial->info->reason = stretched ? DRAPE_REASON_STRETCH : DRAPE_REASON_MOVE;
     trial->info->diagnostic = stretched ? stretch : move;
     trial->info->diagnostic.cloth = drape_model_cloth_of(m, trial->info->diagnostic.node[0]);
     return true;

@@ -266,12 +266,12 @@ static drape_status start(drape_first_order *s, const drape_state *in, double h,
     for (int64_t i = 0; i < s->n; i++)
         rate[s->n + i] = -s->g[drape_first_order_at(s, i)] / s->mass[i];
     s->counted = 0;
-    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+    info->reason = DRAPE_REASON_NONFINITE;
     if (!drape_ranks_all(
             s->ranks,
             drape_all_finite(rate + s->n, (size_t)s->n))) /* the solver would cut its step ten times for it */
         return DRAPE_RETRY_NONFINITE;
-    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
+    info->reason = DRAPE_REASON_SOLVER;
     return s->solver->begin(s, in->t, h) ? DRAPE_OK : DRAPE_E_SOLVER;
 }
 
@@ -316,7 +316,7 @@ static drape_status solve(drape_first_order *s, double end, double h, double *t,
     if (reason == DRAPE_REASON_NEWTON && s->nonfinite)
         reason = DRAPE_REASON_NONFINITE;
     drape_status status = drape_solver_status(reason);
-    info->reason = drape_reason_name(reason);
+    info->reason = reason;
     if (status > 0 && s->crossing)
         info->reason = s->crossing_reason;
     if (drape_system_agree(s->system))
@@ -342,7 +342,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     double end = out->t, t = end;
     info->tolerance = info->residual = NAN; /* it bounds errors, not residuals */
     if (drape_steps_exhausted(in->t, s->values[DRAPE_FIRST_ORDER_MAX_STEPS], true, &s->second, &s->steps)) {
-        info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
+        info->reason = DRAPE_REASON_MAX_STEPS;
         if (s->n > 0)
             s->solver->last_step(s->memory, &info->h);
         diagnose(s, info);
@@ -352,7 +352,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     if (in->t == s->from)
         s->newton.strict = true;
     s->from = NAN;
-    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
+    info->reason = DRAPE_REASON_SOLVER;
     drape_status status = prepare(s, in, end, h, &t, info);
     if (!status && s->n > 0)
         status = solve(s, end, h, &t, info);
@@ -360,7 +360,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     if (!status && !drape_step_moves(t - in->t, s->size, s->speed, t == s->span[1] || t == end, &s->tiny)) {
         info->h = t - in->t;
         s->crossing = s->crossed;
-        info->reason = s->crossing ? s->crossing_reason : drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        info->reason = s->crossing ? s->crossing_reason : DRAPE_REASON_ERROR_TEST;
         status = DRAPE_E_STEP_TOO_SMALL;
     }
     if (end - t <= LANDED * fabs(end))
@@ -375,7 +375,7 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     memcpy(out->v, s->v, nodes * sizeof *out->v);
     out->t = t;
     info->h = t - in->t;
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    info->reason = DRAPE_REASON_CONVERGED;
     /* The work, by the trapezoidal rule. */
     double after[2];
     measure_powers(s, out->t, after);

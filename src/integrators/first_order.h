@@ -150,7 +150,7 @@ struct drape_first_order {
     /* Why callbacks failed in this step; the libraries keep only the sign. */
     bool nonfinite, crossing; /* the last residual */
     bool crossed;             /* some residual; the last that did: */
-    const char *crossing_reason;
+    drape_reason crossing_reason;
     drape_diagnostic crossing_pair;
     drape_status failure; /* < 0: the pattern could not be extended */
 };

@@ -12,9 +12,9 @@
 
 /* The report of a step. */
 typedef struct drape_step_info {
-    const char *reason; /* "converged", or why not; static text */
-    double h;           /* [s] the step taken; set by integrators that choose their own steps */
-    double retry;       /* [s] after a failed error test: the size of the next attempt; 0: half of h */
+    drape_reason reason; /* DRAPE_REASON_CONVERGED, or why not */
+    double h;            /* [s] the step taken; set by integrators that choose their own steps */
+    double retry;        /* [s] after a failed error test: the size of the next attempt; 0: half of h */
     int iterations;
     bool laborious;             /* see drape_solve_report */
     double residual, tolerance; /* [N] */

@@ -90,10 +90,10 @@ drape_status drape_local_error_begin(drape_local_error *c, const drape_state *in
     a->t1 = a->h == left ? a->stop : in->t + a->h;
     info->h = a->h;
     if (drape_steps_exhausted(in->t, c->max_steps, a->t1 != a->end, &c->second, &c->steps)) {
-        info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
+        info->reason = DRAPE_REASON_MAX_STEPS;
         return DRAPE_E_STEP_TOO_SMALL;
     }
-    info->reason = drape_reason_name(DRAPE_REASON_ROUND_OFF);
+    info->reason = DRAPE_REASON_ROUND_OFF;
     return a->t1 > in->t && isfinite(a->h) ? DRAPE_OK : DRAPE_E_STEP_TOO_SMALL;
 }
 
@@ -148,11 +148,11 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
     int32_t node;
     const double error = drape_local_error_norm(c, ex, ev, &node);
     if (!isfinite(error)) {
-        info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+        info->reason = DRAPE_REASON_NONFINITE;
         return DRAPE_RETRY_NONFINITE;
     }
     if (error > 1) {
-        info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        info->reason = DRAPE_REASON_ERROR_TEST;
         info->diagnostic = (drape_diagnostic){.what = "local error / tolerance",
                                               .term = "",
                                               .element = -1,
@@ -164,7 +164,7 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
         return DRAPE_RETRY_REJECTED;
     }
     if (!drape_step_moves(a->h, c->size, c->speed, a->t1 == a->stop, &c->tiny)) {
-        info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
+        info->reason = DRAPE_REASON_ERROR_TEST;
         return DRAPE_E_STEP_TOO_SMALL;
     }
     const bool whole = !a->cut || a->again;
@@ -172,7 +172,7 @@ drape_status drape_local_error_test(drape_local_error *c, const drape_local_atte
                                   .h = whole ? a->h : c->past.h,
                                   .error = whole ? fmax(error, MIN_ERROR) : c->past.error,
                                   .proposed = propose(c, a, error)};
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    info->reason = DRAPE_REASON_CONVERGED;
     return DRAPE_OK;
 }
 

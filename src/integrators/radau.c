@@ -141,7 +141,7 @@ typedef struct radau_state {
 
     /* Why the last evaluation failed. */
     bool nonfinite, crossing;
-    const char *crossing_reason;
+    drape_reason crossing_reason;
     drape_diagnostic crossing_pair;
 } radau_state;
 
@@ -294,7 +294,7 @@ static drape_point choose_matrix_point(radau_state *s, double h)
             }
         }
         const drape_point point = place(s, p->t + h / 2, last->x, z, v);
-        const char *reason;
+        drape_reason reason;
         drape_diagnostic pair;
         if (!drape_system_crosses(s->system, s->x, point.t, &reason, &pair))
             return point;
@@ -369,7 +369,7 @@ static double move(radau_state *s, double h)
 static drape_status solve(radau_state *s, double h, drape_step_info *info)
 {
     double before = 0, rate_before = 0;
-    info->reason = drape_reason_name(DRAPE_REASON_NEWTON);
+    info->reason = DRAPE_REASON_NEWTON;
     s->left = drape_pow(fmax(s->left, DBL_EPSILON), 0.8);
     s->theta = FAST;
     s->hardest = 0;
@@ -417,9 +417,9 @@ static drape_status solve(radau_state *s, double h, drape_step_info *info)
         status = evaluate_stages(s, h);
     }
     if (status == DRAPE_RETRY_LINEAR)
-        info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+        info->reason = DRAPE_REASON_SINGULAR;
     if (s->nonfinite)
-        info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+        info->reason = DRAPE_REASON_NONFINITE;
     if (s->crossing)
         info->reason = s->crossing_reason;
     return status ? status : DRAPE_RETRY_NONLINEAR;
@@ -483,7 +483,7 @@ static void diagnose(radau_state *s, drape_step_info *info)
         info->diagnostic = s->crossing_pair;
     if (!s->nonfinite)
         return;
-    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+    info->reason = DRAPE_REASON_NONFINITE;
     for (int64_t i = 0; i < s->n; i++)
         force[i] = s->g[node_at(s, i)];
     info->diagnostic = drape_system_diagnose_dof(s->system, force, "force [N]", INFINITY);
@@ -530,7 +530,7 @@ static drape_status find_stages(radau_state *s, double h, drape_step_info *info)
     s->bounds = false;
     do {
         const bool kept = s->have_matrix && !s->current;
-        info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+        info->reason = DRAPE_REASON_SINGULAR;
         status = prepare_matrix(s, h);
         if (!status)
             status = solve(s, h, info);
@@ -612,7 +612,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     s->next = kept;
     out->t = s->reached = a.t1;
     info->h = a.h;
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    info->reason = DRAPE_REASON_CONVERGED;
     return DRAPE_OK;
 }
 

@@ -117,7 +117,7 @@ static drape_status evaluate(rosenbrock_state *s, double t, double *g, drape_ste
         return drape_system_status(e->system);
     if (drape_all_finite(g, e->nodes))
         return DRAPE_OK;
-    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+    info->reason = DRAPE_REASON_NONFINITE;
     for (size_t i = 0; i < e->dofs; i++)
         s->right[i] = g[drape_step_equation_at(e, i)];
     info->diagnostic = drape_system_diagnose_dof(e->system, s->right, "force [N]", INFINITY);
@@ -186,7 +186,7 @@ static drape_status factor(rosenbrock_state *s, double w, drape_step_info *info)
         drape_system_damping(e->system, &e->point, m->more[0]);
     e->work.jacobians++;
     e->work.jacobian_seconds += drape_system_matrix_clock(m) - start;
-    info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+    info->reason = DRAPE_REASON_SINGULAR;
     return drape_system_matrix_factor(m, false);
 }
 
@@ -257,7 +257,7 @@ static drape_status solve_stage(rosenbrock_state *s, const drape_state *in, doub
     for (int64_t j = 0; damping && j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             s->right[drape_pattern_row(p, j, k)] += damping[k] * s->rx[j];
-    info->reason = drape_reason_name(DRAPE_REASON_SINGULAR);
+    info->reason = DRAPE_REASON_SINGULAR;
     status = drape_system_matrix_solve(s->linear, s->right, s->ux[i]);
     for (size_t k = 0; k < e->dofs; k++)
         s->uv[i][k] = w * s->ux[i][k] - s->rx[k];

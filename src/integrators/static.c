@@ -163,7 +163,7 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
             memcpy(s->best_x, out->x, e->nodes * sizeof *out->x);
             memcpy(s->best_internal, s->internal, (size_t)e->model->internal_count * sizeof *s->internal);
         }
-        info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+        info->reason = DRAPE_REASON_CONVERGED;
         if (info->residual <= tolerance)
             return DRAPE_OK;
         const bool falls = isnan(last) || info->residual < MAX_FACTOR * last;
@@ -173,7 +173,7 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
             break; /* forces are too inexact here to tell an equilibrium, as of cloth that nothing holds */
         if (info->residual <= rounding) {
             end_at_best(s, out, rounding, info);
-            info->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
+            info->reason = DRAPE_REASON_ROUNDING;
             info->tolerance = rounding;
             return DRAPE_OK;
         }
@@ -182,7 +182,7 @@ static drape_status follow(static_state *s, double mass_weight, drape_state *out
         last = info->residual;
     }
     if (fails == 0)
-        info->reason = drape_reason_name(DRAPE_REASON_STALLED);
+        info->reason = DRAPE_REASON_STALLED;
     info->tolerance = tolerance;
     end_at_best(s, out, tolerance, info);
     return info->lenient && isfinite(s->best) ? DRAPE_RETRY_NONLINEAR : DRAPE_E_SOLVER;

@@ -408,7 +408,7 @@ static bool blew_up(const drape_model *m, const drape_state *out, drape_step_inf
     double speed = vec3_norm(out->v + 3 * (size_t)node);
     if (speed <= MAX_SPEED && drape_all_finite(out->x + 3 * (size_t)node, 3))
         return false;
-    info->reason = drape_reason_name(DRAPE_REASON_BLOW_UP);
+    info->reason = DRAPE_REASON_BLOW_UP;
     info->diagnostic = (drape_diagnostic){.what = "speed [m/s]",
                                           .term = "",
                                           .element = -1,
@@ -431,7 +431,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->residual = info->tolerance = NAN;
     info->lenient = s->values[PARAM_GUARD] == 0;
     if (s->values[PARAM_SUBSTEPS] == 0 && n > MAX_SUBSTEPS) {
-        info->reason = drape_reason_name(DRAPE_REASON_MAX_SUBSTEPS);
+        info->reason = DRAPE_REASON_MAX_SUBSTEPS;
         info->diagnostic.what = "substeps";
         info->diagnostic.value = MAX_SUBSTEPS + 1;
         info->diagnostic.limit = MAX_SUBSTEPS;
@@ -439,7 +439,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     }
     memcpy(out->x, in->x, nodes * sizeof *out->x);
     memcpy(out->v, in->v, nodes * sizeof *out->v);
-    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+    info->reason = DRAPE_REASON_CONVERGED;
     s->self.cancel = s->limit.cancel = s->contact.cancel = *drape_system_cancel_flag(s->system);
     for (int64_t k = 0; k < n; k++) {
         const substep sub = {.t0 = in->t + (double)k / (double)n * (out->t - in->t),

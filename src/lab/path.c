@@ -168,7 +168,7 @@ static drape_status count_unstable(follower *p, double factor, int64_t *unstable
 static drape_status examine(follower *p, drape_path_point *point)
 {
     const drape_state *now = drape_sim_state(p->sim);
-    const char *reason;
+    drape_reason reason;
     drape_diagnostic diagnostic;
     drape_status status =
         drape_system_check(p->tangent.system, p->x, now->x, now->internal, &reason, &diagnostic);

@@ -23,7 +23,7 @@ static void change(drape_step_equation *e, change_positions *how, double *d)
 /* Whether something is passed on the straight path from the start of the step to d, pins moving along. */
 static bool crosses(drape_step_equation *e, const double *d)
 {
-    const char *reason;
+    drape_reason reason;
     drape_diagnostic diagnostic;
     drape_step_equation_move(e, d);
     return drape_system_crosses(e->system, e->x, e->point.t, &reason, &diagnostic);

@@ -302,7 +302,7 @@ static bool is_rounding(drape_newton *s, const double *d, bool *finite)
 static drape_status judge_islands(drape_newton *s, bool *done)
 {
     const drape_step_equation *e = s->equation;
-    const char *reason;
+    drape_reason reason;
     drape_diagnostic diagnostic;
     bool changed;
     const drape_status status =
@@ -548,19 +548,18 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         }
     }
     if (report->residual <= tolerance) {
-        report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
+        report->reason = DRAPE_REASON_CONVERGED;
         return DRAPE_OK;
     }
     if (!status && (s->near_enough || s->stopping.ended_by_error)) {
-        report->reason =
-            drape_reason_name(s->near_enough ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR);
+        report->reason = s->near_enough ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR;
         report->tolerance = NAN; /* the residual has none */
         report->by_error = !s->near_enough;
         return DRAPE_OK;
     }
     double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;
     if (report->residual <= rounding) {
-        report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
+        report->reason = DRAPE_REASON_ROUNDING;
         report->tolerance = rounding;
         return DRAPE_OK;
     }
@@ -568,13 +567,13 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
      * large. */
     if (finite && status >= 0 && s->effort.keeps && (s->left < s->start || s->error < s->first) &&
         !(s->error > e->model->length)) {
-        report->reason = drape_reason_name(DRAPE_REASON_ITERATIONS);
+        report->reason = DRAPE_REASON_ITERATIONS;
         report->tolerance = NAN;
         report->solved = false;
         return DRAPE_OK;
     }
     if (!status || s->effort.keeps) { /* else unreachable if KINSOL tests what its documentation says */
-        report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
+        report->reason = DRAPE_REASON_RESIDUAL;
         status = status < 0 ? status : DRAPE_RETRY_NONLINEAR;
     }
     report->usable = report->lenient && finite && status > 0;
@@ -586,9 +585,8 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
 {
     drape_step_equation *e = s->equation;
     long iterations = 0;
-    const drape_reason reason = drape_solver_reason(codes, sizeof codes / sizeof *codes, code);
-    drape_status status = drape_solver_status(reason);
-    report->reason = drape_reason_name(reason);
+    report->reason = drape_solver_reason(codes, sizeof codes / sizeof *codes, code);
+    drape_status status = drape_solver_status(report->reason);
     KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
     report->laborious = !s->effort.keeps && (double)iterations > fmax(EASY, EASY_SHARE * s->effort.most);
@@ -603,7 +601,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     if (drape_system_agree(e->system))
         return drape_system_status(e->system);
     if (s->failure) {
-        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        report->reason = DRAPE_REASON_MEMORY;
         return s->failure;
     }
     report->further_seconds = s->further;
@@ -619,11 +617,8 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
                                 drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report = (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
-                                   .error = NAN,
-                                   .left = NAN,
-                                   .own = NAN,
-                                   .lenient = s->lenient};
+    *report = (drape_solve_report){
+        .reason = DRAPE_REASON_CONVERGED, .error = NAN, .left = NAN, .own = NAN, .lenient = s->lenient};
     s->effort = effort ? *effort : s->own_effort;
     s->tolerance = s->effort.linear_tolerance;
     begin(s);
@@ -637,7 +632,7 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_effort *effo
     if (drape_system_agree(e->system))
         return drape_system_status(e->system);
     if (status) {
-        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        report->reason = DRAPE_REASON_MEMORY;
         return status;
     }
     drape_guess_make_feasible(e, d, s->right, s->fraction);

@@ -8,7 +8,7 @@
 
 /* How one solve ended. */
 typedef struct drape_solve_report {
-    const char *reason; /* which rule accepted it, or why none did: of base/reason.h */
+    drape_reason reason; /* which rule accepted it, or why none did: of base/reason.h */
     int iterations;
     double residual, tolerance; /* [N] */
     bool laborious; /* near the largest number of iterations: a larger step of the same motion might fail */

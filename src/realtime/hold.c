@@ -54,7 +54,7 @@ static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info
     const double t1 = fmin(s->now + sim->realtime->dt, s->cut ? s->cut_end : s->end), h = t1 - now->t;
     if (!(h > 0))
         return DRAPE_RETRY_REJECTED;
-    *info = (drape_step_info){.reason = drape_reason_name(DRAPE_REASON_HELD),
+    *info = (drape_step_info){.reason = DRAPE_REASON_HELD,
                               .h = h,
                               .residual = NAN,
                               .tolerance = NAN,
@@ -113,7 +113,7 @@ bool drape_hold(drape_sim *sim, drape_trial *trial, bool stopped, drape_status *
         return false;
     drape_log(sim->ctx, DRAPE_LOG_WARNING,
               "t=%.9g h=%.4g: no step can be made (%s), and the cloth is held where it is",
-              drape_sim_time(sim), held.h, trial->info->reason);
+              drape_sim_time(sim), held.h, drape_system_reason_name(sim->system, trial->info->reason));
     *trial->info = held;
     sim->statistics.steps_held++;
     return true;

@@ -180,7 +180,7 @@ static drape_status take_steps(drape_sim *sim, const plan *p, double begun, doub
         m->unchecked |= attempt.accepted && pins_move_apart(sim);
         report->attempts++;
         report->rejected += !attempt.accepted;
-        report->held += attempt.accepted && attempt.reason == drape_reason_name(DRAPE_REASON_HELD);
+        report->held += attempt.accepted && sim->reason == DRAPE_REASON_HELD;
         if (!attempt.accepted && !sim->schedule.cut)
             m->cap = m->relaxed_again ? INFINITY : fmin(m->cap, attempt.h / 2);
         report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;

@@ -129,8 +129,7 @@ static drape_status advise(drape_sim *sim, const drape_attempt *last, char *text
     text[0] = 0;
     if (sim->model->part || sim->chosen.integrator->projects_contact || (sim->rescue && may_relax(sim)))
         return DRAPE_OK;
-    const bool refused = strcmp(last->reason, drape_reason_name(DRAPE_REASON_PENETRATION)) == 0 ||
-                         strcmp(last->reason, drape_reason_name(DRAPE_REASON_COLLISION)) == 0;
+    const bool refused = sim->reason == DRAPE_REASON_PENETRATION || sim->reason == DRAPE_REASON_COLLISION;
     const double t1 = last->t + fmax(last->h, sim->schedule.dt);
     const drape_status status =
         drape_room_lacks(contact_of(sim), t1, refused ? DRAPE_RELAX_NEAR : DRAPE_RELAX_NONE, &lacks);

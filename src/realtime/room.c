@@ -373,7 +373,7 @@ drape_status drape_room_relax(drape_contact *c, double t1, drape_relax_extent ex
 /* All that is too near at the end, and then pair by pair what refuses the path to there. */
 drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
 {
-    const char *reason = "";
+    drape_reason reason = DRAPE_REASON_CONVERGED;
     drape_diagnostic diagnostic;
     int32_t added = 1;
     if (!c)

@@ -120,17 +120,19 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
         drape_archive_double(a, numbers[i]);
     int count = sim->reason_count;
     drape_archive_int(a, &count);
-    if (drape_archive_good(a) && !is_place(count, 0, DRAPE_MAX_REASONS + 1))
+    if (drape_archive_good(a) && !is_place(count, 0, (int)(sizeof sim->reasons / sizeof *sim->reasons) + 1))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d reasons for rejections", count);
     for (int i = 0; i < count && drape_archive_good(a); i++) {
         drape_reason_total *reason = &sim->reasons[i];
         char text[DRAPE_ARCHIVE_TEXT];
-        snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);
+        snprintf(text, sizeof text, "%s",
+                 a->reading ? "" : drape_system_reason_name(sim->system, reason->reason));
         drape_archive_text(a, text, sizeof text);
         drape_archive_int64(a, &reason->count);
-        /* a counted reason is static text; one that was read is stored in the sim's arena */
-        reason->reason = a->reading ? drape_arena_text(sim->arena, text) : reason->reason;
-        if (!reason->reason)
+        const char *name = drape_archive_has_read(a) ? drape_arena_text(sim->arena, text) : NULL;
+        if (name)
+            reason->reason = drape_system_reason(sim->system, name);
+        else if (drape_archive_has_read(a))
             drape_archive_note(a, DRAPE_E_MEMORY);
         sim->reason_count = drape_archive_good(a) ? i + 1 : i;
     }

@@ -138,8 +138,8 @@ static drape_status copy_driver(drape_sim *to, drape_sim *from, const int32_t *b
     drape_events_continue(to, from);
     to->reason_count = from->reason_count;
     for (int i = 0; i < from->reason_count; i++) {
-        to->reasons[i].count = from->reasons[i].count;
-        to->reasons[i].reason = drape_arena_text(to->arena, from->reasons[i].reason);
+        const char *name = drape_arena_text(to->arena, drape_sim_reason(from, i, &to->reasons[i].count));
+        to->reasons[i].reason = name ? drape_system_reason(to->system, name) : DRAPE_REASON_OTHER;
     }
     return drape_arena_status(to->arena);
 }

@@ -27,7 +27,7 @@ static void straight(const drape_state *a, const drape_state *b, double share, s
  * began. */
 static drape_status check(drape_sim *sim, double t)
 {
-    const char *reason;
+    drape_reason reason;
     drape_diagnostic diagnostic;
     return drape_system_check_contact(sim->system, sim->frame, t, &reason, &diagnostic);
 }

@@ -88,7 +88,7 @@ const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count)
     bool there = sim && index >= 0 && index < sim->reason_count;
     if (count)
         *count = there ? sim->reasons[index].count : 0;
-    return there ? sim->reasons[index].reason : NULL;
+    return there ? drape_system_reason_name(sim->system, sim->reasons[index].reason) : NULL;
 }
 
 drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user)

@@ -12,10 +12,9 @@
 #define DRAPE_PENETRATION_TOLERANCE 1e-9 /* [m] a point that is less deep in a collider is on its surface */
 #define DRAPE_MAX_OBSERVERS         8
 #define DRAPE_MAX_HOST_EVENTS       64
-#define DRAPE_MAX_REASONS           32 /* the last one is "other" if there are more */
 
 typedef struct drape_reason_total {
-    const char *reason; /* static text */
+    drape_reason reason;
     int64_t count;
 } drape_reason_total;
 
@@ -79,8 +78,11 @@ struct drape_sim {
     int64_t attempts;
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_left left;
-    drape_reason_total reasons[DRAPE_MAX_REASONS];
+    drape_reason_total
+        reasons[DRAPE_REASON_COUNT + DRAPE_OWN_REASONS]; /* in the order of their first count */
     int reason_count;
+    drape_reason
+        reason; /* of the last attempt in this advance. Not archived: no advance needs an earlier one */
     drape_audit audit;
     const struct drape_rescue_ops *rescue;  /* of steps that fail (rescue.h); NULL: there is none */
     struct drape_realtime_memory *realtime; /* what rescue keeps, */

@@ -29,7 +29,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     size_t n = 3 * (size_t)sim->model->node_count;
     const bool finite = drape_all_finite(next->x, n) && drape_all_finite(next->v, n);
     if (!drape_ranks_all(drape_model_ranks(sim->model), finite)) {
-        info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
+        info->reason = DRAPE_REASON_NONFINITE;
         return DRAPE_RETRY_NONFINITE;
     }
     if (info->committed)
@@ -39,16 +39,15 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     const bool away = !info->lenient && drape_sim_ran_away(sim, next, info);
     const drape_status measured = drape_system_agree(sim->system);
     if (measured) {
-        info->reason =
-            drape_reason_name(measured == DRAPE_E_STOPPED ? DRAPE_REASON_CANCELLED : DRAPE_REASON_MEMORY);
+        info->reason = measured == DRAPE_E_STOPPED ? DRAPE_REASON_CANCELLED : DRAPE_REASON_MEMORY;
         return measured;
     }
     if (away) {
-        info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
+        info->reason = DRAPE_REASON_ENERGY;
         return DRAPE_RETRY_REJECTED;
     }
     if (!info->lenient && drape_sim_left_too_much(sim, next, info)) {
-        info->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
+        info->reason = DRAPE_REASON_RESIDUAL;
         return DRAPE_RETRY_NONLINEAR;
     }
     const drape_state *before = drape_sim_state(sim);
@@ -111,7 +110,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     if (sim->rescue)
         sim->rescue->solved(sim, info);
     if (status == DRAPE_E_STOPPED)
-        info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
+        info->reason = DRAPE_REASON_CANCELLED;
     if (status && !info->usable)
         return status;
     info->open_work = 0;
@@ -205,15 +204,11 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
         sim->rescue->accepted(sim);
 }
 
-static void count_reason(drape_sim *sim, const char *reason)
+static void count_reason(drape_sim *sim, drape_reason reason)
 {
     int i = 0;
-    while (i < sim->reason_count && strcmp(sim->reasons[i].reason, reason) != 0)
+    while (i < sim->reason_count && sim->reasons[i].reason != reason)
         i++;
-    if (i == sim->reason_count && i >= DRAPE_MAX_REASONS - 1) {
-        i = DRAPE_MAX_REASONS - 1;
-        reason = drape_reason_name(DRAPE_REASON_OTHER);
-    }
     if (i == sim->reason_count)
         sim->reasons[sim->reason_count++] = (drape_reason_total){.reason = reason};
     sim->reasons[i].count++;
@@ -274,7 +269,7 @@ static drape_verdict ask_events(drape_sim *sim, const double memory[2], drape_tr
     memcpy(sim->scratch, memory, sizeof sim->scratch);
     if (sim->chosen.integrator->own_steps) /* it has accepted the step already */
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
-    trial->info->reason = drape_reason_name(DRAPE_REASON_EVENT);
+    trial->info->reason = DRAPE_REASON_EVENT;
     trial->status = DRAPE_RETRY_REJECTED;
     return trial->stop ? DRAPE_STOP : DRAPE_REPEAT;
 }
@@ -321,16 +316,10 @@ static void describe_nearest(const drape_sim *sim, const drape_attempt *attempt,
         describe_diagnostic(sim->model, &nearest, text, size);
 }
 
-/* Whether an event, and nothing else, kept an attempt from being accepted. */
-static bool is_event(const drape_attempt *attempt)
-{
-    return attempt->reason == drape_reason_name(DRAPE_REASON_EVENT);
-}
-
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char diagnostic[400], nearest[400], residual[100] = "", distortion[200] = "", advice[200] = "";
-    if (stop == DRAPE_E_MEMORY || is_event(attempt)) /* the message is set */
+    if (stop == DRAPE_E_MEMORY || sim->reason == DRAPE_REASON_EVENT) /* the message is set */
         return stop;
     if (stop == DRAPE_E_STOPPED)
         return drape_sim_check_cancel(sim);
@@ -376,8 +365,7 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
  * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
-    drape_step_info info = {
-        .reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h, .error = NAN, .left = NAN, .own = NAN};
+    drape_step_info info = {.reason = DRAPE_REASON_CONVERGED, .h = h, .error = NAN, .left = NAN, .own = NAN};
     const double t = drape_sim_state(sim)->t, memory[2] = {sim->scratch[0], sim->scratch[1]};
     const drape_status status = compute_next(sim, t1, h, &info);
     drape_trial trial = trial_of(sim, &info, status);
@@ -399,13 +387,14 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     if (verdict == DRAPE_SUBSTITUTE)
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
     *stop = verdict == DRAPE_STOP ? trial.stop : DRAPE_OK;
+    sim->reason = info.reason;
     return (drape_attempt){.index = sim->attempts++,
                            .t = t,
                            .h = info.h,
                            /* refused by the controller alone, an attempt has the status of a success */
                            .status =
                                trial.status || verdict == DRAPE_ACCEPT ? trial.status : DRAPE_RETRY_REJECTED,
-                           .reason = info.reason,
+                           .reason = drape_system_reason_name(sim->system, info.reason),
                            .accepted = accepted,
                            .iterations = info.iterations,
                            .residual = info.residual,
@@ -431,7 +420,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     drape_system_end_step(sim->system);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
-    if (!attempt->accepted && !is_event(attempt) && sim->ctx->def.log) {
+    if (!attempt->accepted && sim->reason != DRAPE_REASON_EVENT && sim->ctx->def.log) {
         char diagnostic[400];
         describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
         drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,

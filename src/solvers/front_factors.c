@@ -1,6 +1,6 @@
 /* front_factors.c: see front_factors.h. In the panels, the lower half has L below the diagonal tiles, which
- * are Cholesky factors or the factored diagonal blocks of U; the upper half has U' below them. A solution goes
- * from the branches to the top, and back; what a front passes to its parent is in `left`. */
+ * are Cholesky factors or the factored diagonal blocks of U; the upper half has U' below them. A solution
+ * goes from the branches to the top, and back; what a front passes to its parent is in `left`. */
 #include "solvers/front_factors.h"
 
 #include "base/lanes.h"

@@ -445,7 +445,7 @@ START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
         memset(out->v, 0, 3 * (size_t)s.model->node_count * sizeof *out->v);
         out->v[3 * 20 + 1] = wrongs[k];
         for (;;) {
-            drape_step_info info = {.reason = "converged", .h = h};
+            drape_step_info info = {.reason = DRAPE_REASON_CONVERGED, .h = h};
             drape_trial trial = {.model = s.model,
                                  .in = scene_state(&s),
                                  .out = out,
@@ -456,7 +456,7 @@ START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
             out->t = h;
             attempts++;
             const drape_verdict verdict = ops->judge(values, &trial);
-            ck_assert_str_eq(info.reason, "error_test");
+            ck_assert_int_eq(info.reason, DRAPE_REASON_ERROR_TEST);
             ck_assert(verdict != DRAPE_ACCEPT);
             if (verdict == DRAPE_STOP) {
                 ck_assert_int_eq(trial.stop, DRAPE_E_STEP_TOO_SMALL);

@@ -440,7 +440,7 @@ START_TEST(nan_is_forgotten)
     drape_system_force(t.system, &point, t.g[0]);
     ck_assert_int_gt(drape_contact_active(drape_system_contact(t.system), &gap), 0);
     for (size_t broken = 0; broken < n; broken += 7) {
-        const char *reason = "";
+        drape_reason reason = DRAPE_REASON_CONVERGED;
         drape_diagnostic diagnostic;
         memcpy(t.x, t.at.x, n * sizeof *t.x);
         t.x[broken] = broken % 2 ? NAN : INFINITY;

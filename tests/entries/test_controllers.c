@@ -63,7 +63,7 @@ START_TEST(good_steps_are_accepted)
 {
     for (int i = 0; drape_controllers[i]; i++) {
         double values[DRAPE_MAX_PARAMS];
-        drape_step_info info = {.reason = "converged"};
+        drape_step_info info = {.reason = DRAPE_REASON_CONVERGED};
         drape_status status = DRAPE_OK;
         defaults(drape_controllers[i], values);
         ck_assert_int_eq(judge(drape_controllers[i], values, 1, 0.01, &info, &status), DRAPE_ACCEPT);
@@ -82,7 +82,7 @@ START_TEST(failures_that_no_smaller_step_cures_keep_their_status)
     for (int i = 0; drape_controllers[i]; i++)
         for (int k = 0; k < 3; k++) {
             double values[DRAPE_MAX_PARAMS];
-            drape_step_info info = {.reason = "solver"};
+            drape_step_info info = {.reason = DRAPE_REASON_SOLVER};
             drape_status status = statuses[k];
             defaults(drape_controllers[i], values);
             ck_assert_int_eq(judge(drape_controllers[i], values, 1, 0.01, &info, &status), DRAPE_STOP);
@@ -99,7 +99,7 @@ START_TEST(endless_failure_ends)
         for (int k = 0; k < 5; k++)
             for (drape_status failed = DRAPE_RETRY_NONLINEAR; failed <= DRAPE_RETRY_REJECTED; failed++) {
                 double values[DRAPE_MAX_PARAMS], h = 1;
-                drape_step_info info = {.reason = "max_iterations"};
+                drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
                 drape_status status = failed;
                 int attempts = 1;
                 drape_verdict verdict;
@@ -124,7 +124,7 @@ static const drape_controller_ops *controller_named(const char *name)
 
 START_TEST(fixed_never_halves)
 {
-    drape_step_info info = {.reason = "max_iterations"};
+    drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     drape_status status = DRAPE_RETRY_DEGENERATE;
     ck_assert_int_eq(judge(controller_named("fixed"), NULL, 0, 1, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_SOLVER);
@@ -133,7 +133,7 @@ END_TEST
 
 START_TEST(halving_stops_at_dt_min)
 {
-    drape_step_info info = {.reason = "max_iterations"};
+    drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     const double dt_min = 0.25;
     drape_status status = DRAPE_RETRY_LINEAR;
     ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 3, 0.5, &info, &status), DRAPE_RETRY);
@@ -144,7 +144,7 @@ END_TEST
 
 START_TEST(halving_stops_where_the_time_stands_still)
 {
-    drape_step_info info = {.reason = "max_iterations"};
+    drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     const double dt_min = 1e-300;
     drape_status status = DRAPE_RETRY_LINEAR;
     ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 1e6, 1e-11, &info, &status), DRAPE_STOP);

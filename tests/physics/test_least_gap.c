@@ -134,7 +134,7 @@ START_TEST(rounding_does_not_add_up)
     for (size_t i = 1; i < n; i += 3)
         at->x[i] = 5 * rounding;
     for (int k = 0; k < 200; k++) {
-        const char *reason;
+        drape_reason reason;
         drape_diagnostic diagnostic;
         ck_assert_int_eq(drape_system_begin(s.sim->system, at), DRAPE_OK);
         memcpy(next, at->x, sizeof next);
