@@ -1,6 +1,7 @@
 /* multigrid.c: see multigrid.h. */
 #include "base/lanes.h"
 #include "solvers/multigrid_parts.h"
+#include "solvers/pcg.h"
 
 #include <float.h>
 #include <math.h>
@@ -344,16 +345,18 @@ static double largest_tridiagonal(int n, const double *diagonal, const double *o
     return high;
 }
 
-/* z = D^-1 r. Returns r'z. */
-static double divide_by_diagonal(const level *l, const double *r, double *z)
+static void multiply_level(const void *owner, const double *x, double *y)
 {
+    multiply(owner, x, y);
+}
+
+/* z = D^-1 r. */
+static void divide_by_diagonal(const void *owner, const double *r, double *z)
+{
+    const level *l = owner;
     const size_t size = (size_t)l->a.size, n = scalars(&l->a);
-    double product = 0;
     for (size_t i = 0; i < n; i += size)
         multiply_block(l->a.size, l->inverse + size * i, r + i, z + i);
-    for (size_t i = 0; i < n; i++)
-        product += r[i] * z[i];
-    return drape_ranks_sum(ranks_of(l), product);
 }
 
 /* The largest eigenvalue of D^-1 A, D its diagonal blocks, from below: that of the tridiagonal matrix of
@@ -364,32 +367,27 @@ static double largest_eigenvalue(level *l)
 {
     const size_t n = scalars(&l->a), row = l->border ? (size_t)l->border->first[l->border->ranks->rank] : 0,
                  first = row * (size_t)l->a.size;
-    double diagonal[LANCZOS_STEPS], off[LANCZOS_STEPS], *r = l->r, *p = l->x, *q = l->b, last = 0;
+    double diagonal[LANCZOS_STEPS], off[LANCZOS_STEPS], length[LANCZOS_STEPS], ratio[LANCZOS_STEPS];
+    drape_pcg pcg = {.n = (int64_t)n,
+                     .owner = l,
+                     .multiply = multiply_level,
+                     .precondition = divide_by_diagonal,
+                     .ranks = ranks_of(l),
+                     .r = l->r,
+                     .z = l->b,
+                     .p = l->x,
+                     .q = l->b,
+                     .length = length,
+                     .ratio = ratio};
     for (size_t i = 0; i < n; i++)
-        r[i] = (double)((first + i + 1) * 2654435761U % 65536) / 32768 - 1;
-    double size = divide_by_diagonal(l, r, p);
-    int k = 0;
-    while (k < LANCZOS_STEPS) {
-        double curvature = 0;
-        multiply(l, p, q);
-        for (size_t i = 0; i < n; i++)
-            curvature += p[i] * q[i];
-        curvature = drape_ranks_sum(ranks_of(l), curvature);
-        if (!(curvature > 0)) /* it is exact already, or A is not positive definite */
-            break;
-        const double a = size / curvature, before = size;
-        for (size_t i = 0; i < n; i++)
-            r[i] -= a * q[i];
-        size = divide_by_diagonal(l, r, q);
-        const double b = size / before;
-        for (size_t i = 0; i < n; i++)
-            p[i] = q[i] + b * p[i];
-        diagonal[k] = 1 / a + last;
-        off[k] = b / (a * a);
-        last = b / a;
-        k++;
+        l->b[i] = (double)((first + i + 1) * 2654435761U % 65536) / 32768 - 1;
+    drape_pcg_solve(&pcg, l->b, NULL, 0, LANCZOS_STEPS);
+    for (int k = 0; k < pcg.iterations; k++) {
+        diagonal[k] = 1 / length[k] + (k > 0 ? ratio[k - 1] / length[k - 1] : 0);
+        off[k] = k + 1 < pcg.iterations ? ratio[k] / (length[k] * length[k]) : 0;
     }
-    return k > 0 ? largest_tridiagonal(k, diagonal, off) : 1;
+    /* none: A is not positive definite */
+    return pcg.iterations > 0 ? largest_tridiagonal(pcg.iterations, diagonal, off) : 1;
 }
 
 /* P = (1 - w D^-1 A) T, T the modes of the aggregates. */

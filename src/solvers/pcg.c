@@ -26,10 +26,11 @@ static double dot(const drape_pcg *s, const double *a, const double *b)
 
 void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance, int max_iterations)
 {
-    size_t bytes = (size_t)s->n * sizeof *x;
+    const size_t bytes = (size_t)s->n * sizeof *x;
     s->iterations = 0;
     s->definite = true;
-    memset(x, 0, bytes);
+    if (x)
+        memset(x, 0, bytes);
     memcpy(s->r, b, bytes);
     s->precondition(s->owner, s->r, s->z);
     memcpy(s->p, s->z, bytes);
@@ -42,15 +43,17 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
             /* A direction without positive curvature. Before the first step x becomes the preconditioned
              * residual itself, which is a descent direction. */
             s->definite = false;
-            if (s->iterations == 0)
-                memcpy(x, s->p, (size_t)s->n * sizeof *x);
+            if (s->iterations == 0 && x)
+                memcpy(x, s->p, bytes);
             return;
         }
         const double a = size / curvature;
-        for (int64_t i = 0; i < s->n; i++) {
+        for (int64_t i = 0; x && i < s->n; i++)
             x[i] += a * s->p[i];
+        for (int64_t i = 0; i < s->n; i++)
             s->r[i] -= a * s->q[i];
-        }
+        if (s->length)
+            s->length[s->iterations] = a;
         s->iterations++;
         if (s->iterations == max_iterations)
             return;
@@ -59,6 +62,8 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance,
         size = dot(s, s->r, s->z);
         s->converged = size <= goal;
         const double beta = size / before;
+        if (s->ratio)
+            s->ratio[s->iterations - 1] = beta;
         for (int64_t i = 0; i < s->n; i++)
             s->p[i] = s->z[i] + beta * s->p[i];
     }
