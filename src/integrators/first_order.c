@@ -233,10 +233,7 @@ static void diagnose(drape_first_order *s, drape_step_info *info)
     if (s->n == 0)
         return;
     if (s->nonfinite) {
-        for (int64_t i = 0; i < s->n; i++)
-            s->reduced[i] = s->g[drape_first_order_at(s, i)];
-        info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "force [N]", INFINITY);
-        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
+        drape_instant_diagnose(s->system, s->x, s->internal, s->g, s->reduced, info);
         return;
     }
     if (s->crossing) {

@@ -1,6 +1,8 @@
 /* instant.c: see instant.h. */
 #include "integrators/instant.h"
 
+#include <math.h>
+
 /* Within the span the velocity of anything that moves is that at any time, such as the middle. */
 static double middle_of(const double span[2])
 {
@@ -13,6 +15,16 @@ void drape_instant_place_pins(const drape_motion *motion, double t, const double
     drape_motion_place_pins(motion, t, x);
     for (int32_t i = 0; i < motion->moved_count; i++)
         drape_motion_pin_velocity(motion, i, t, middle_of(span), v + 3 * (size_t)motion->moved_node[i]);
+}
+
+void drape_instant_diagnose(drape_system *system, const double *x, const double *internal, const double *g,
+                            double *scratch, drape_step_info *info)
+{
+    const drape_model *m = drape_system_model(system);
+    for (int64_t i = 0; i < 3 * (int64_t)m->free_count; i++)
+        scratch[i] = g[3 * (int64_t)m->node_of_free[i / 3] + i % 3];
+    info->diagnostic = drape_system_diagnose_dof(system, scratch, "force [N]", INFINITY);
+    drape_system_check(system, x, NULL, internal, &info->reason, &info->diagnostic);
 }
 
 /* Of the forces that were evaluated last, or of g, on colliders and supports. */

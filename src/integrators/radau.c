@@ -478,16 +478,12 @@ static drape_status estimate_error(radau_state *s, const drape_local_attempt *a)
  * crossed. */
 static void diagnose(radau_state *s, drape_step_info *info)
 {
-    double *force = s->rhs;
     if (s->crossing)
         info->diagnostic = s->crossing_pair;
     if (!s->nonfinite)
         return;
     info->reason = DRAPE_REASON_NONFINITE;
-    for (int64_t i = 0; i < s->n; i++)
-        force[i] = s->g[node_at(s, i)];
-    info->diagnostic = drape_system_diagnose_dof(s->system, force, "force [N]", INFINITY);
-    drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
+    drape_instant_diagnose(s->system, s->x, s->internal, s->g, s->rhs, info);
 }
 
 /* The state at the beginning, and g there. Pinned nodes that do not move keep their positions, and zero

@@ -118,10 +118,7 @@ static drape_status evaluate(rosenbrock_state *s, double t, double *g, drape_ste
     if (drape_all_finite(g, e->nodes))
         return DRAPE_OK;
     info->reason = DRAPE_REASON_NONFINITE;
-    for (size_t i = 0; i < e->dofs; i++)
-        s->right[i] = g[drape_step_equation_at(e, i)];
-    info->diagnostic = drape_system_diagnose_dof(e->system, s->right, "force [N]", INFINITY);
-    drape_system_check(e->system, e->x, NULL, e->point.internal, &info->reason, &info->diagnostic);
+    drape_instant_diagnose(e->system, e->x, e->point.internal, g, s->right, info);
     return DRAPE_RETRY_NONFINITE;
 }
 
