@@ -12,31 +12,25 @@ typedef struct neighbours {
     int32_t *row;
 } neighbours;
 
-/* Called for every (row, column) of every coupling, in order. */
-typedef void visit_pair(neighbours *list, int32_t row, int32_t column);
-
+/* Without rows, counts the neighbours of each column in start[column + 1]; else lists them at `next`. */
 static void visit_couplings(const drape_coupling *couplings, int coupling_count, const int32_t *block_of_node,
-                            neighbours *list, visit_pair *visit)
+                            neighbours *list)
 {
-    for (int c = 0; c < coupling_count; c++)
-        for (int32_t e = 0; e < couplings[c].count; e++) {
-            const int32_t *node = couplings[c].node + (size_t)e * (size_t)couplings[c].nodes;
-            for (int a = 0; a < couplings[c].nodes; a++)
-                for (int b = 0; b < couplings[c].nodes; b++)
-                    if (a != b && block_of_node[node[a]] >= 0 && block_of_node[node[b]] >= 0)
-                        visit(list, block_of_node[node[a]], block_of_node[node[b]]);
-        }
-}
-
-static void count_pair(neighbours *list, int32_t row, int32_t column)
-{
-    (void)row;
-    list->start[column + 1]++;
-}
-
-static void store_pair(neighbours *list, int32_t row, int32_t column)
-{
-    list->row[list->next[column]++] = row;
+    for (int c = 0; c < coupling_count; c++) {
+        const int nodes = couplings[c].nodes;
+        for (int32_t e = 0; e < couplings[c].count; e++)
+            for (int pair = 0; pair < nodes * nodes; pair++) {
+                const int32_t *node = couplings[c].node + (size_t)e * (size_t)nodes;
+                const int32_t row = block_of_node[node[pair / nodes]],
+                              column = block_of_node[node[pair % nodes]];
+                if (pair / nodes == pair % nodes || row < 0 || column < 0)
+                    continue;
+                if (list->row)
+                    list->row[list->next[column]++] = row;
+                else
+                    list->start[column + 1]++;
+            }
+    }
 }
 
 static drape_status list_neighbours(drape_arena *scratch, int32_t block_count, const int32_t *block_of_node,
@@ -47,7 +41,7 @@ static drape_status list_neighbours(drape_arena *scratch, int32_t block_count, c
     list->next = drape_arena_take(scratch, count, sizeof *list->next);
     if (drape_arena_status(scratch))
         return DRAPE_E_MEMORY;
-    visit_couplings(couplings, coupling_count, block_of_node, list, count_pair);
+    visit_couplings(couplings, coupling_count, block_of_node, list);
     for (size_t j = 0; j < count; j++) {
         list->start[j + 1] += list->start[j] + 1; /* + 1: the diagonal */
         list->next[j] = list->start[j];
@@ -56,8 +50,8 @@ static drape_status list_neighbours(drape_arena *scratch, int32_t block_count, c
     if (!list->row)
         return DRAPE_E_MEMORY;
     for (int32_t j = 0; j < block_count; j++)
-        store_pair(list, j, j);
-    visit_couplings(couplings, coupling_count, block_of_node, list, store_pair);
+        list->row[list->next[j]++] = j;
+    visit_couplings(couplings, coupling_count, block_of_node, list);
     return DRAPE_OK;
 }
 
@@ -246,8 +240,9 @@ void drape_pattern_add_antisymmetric(const drape_pattern *p, const double *value
         }
 }
 
-/* Of copies only the blocks that couple them with a node of this rank are complete; these have its column or
- * an own one before it. */
+/* On a rank, the columns of its own nodes come before those of copies of other ranks' nodes. A block is
+ * complete if its row or its column is of an own node: the loop over own columns and their rows below visits
+ * each of these blocks, or its mirror, once. */
 double drape_pattern_asymmetry(const drape_pattern *p, const double *values)
 {
     double largest = 0, difference = 0;
