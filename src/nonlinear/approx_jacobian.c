@@ -144,12 +144,28 @@ static drape_status build_coarse_pattern(drape_approx_jacobian *s, drape_arena *
     return drape_pattern_build(s->arena, c->prolong.coarse, own, &coupling, 1, &c->pattern);
 }
 
-/* The scalar stiffness on the coarse space: P' C P. */
-static drape_status build_coarse_scalars(drape_approx_jacobian *s)
+/* Adds entry k of the scalar stiffness, in row i, to P' C P. */
+static void add_scalar(drape_approx_jacobian *s, int32_t i, int32_t k)
 {
     coarse_matrix *c = &s->coarse;
     const drape_prolong *p = &c->prolong;
     const drape_scalar_stiffness *f = &s->scalar;
+    for (int32_t a = p->start[i]; a < p->start[i + 1]; a++)
+        for (int32_t b = p->start[f->column[k]]; b < p->start[f->column[k] + 1]; b++) {
+            int32_t slot = drape_pattern_find(&c->pattern, p->column[a], p->column[b]);
+            double w = p->weight[a] * p->weight[b];
+            c->elastic[slot] += w * f->elastic[k];
+            if (f->damping)
+                c->damping[slot] += w * f->damping[k];
+            if (k == f->diagonal[i])
+                c->mass[slot] += w * s->model->mass[s->model->node_of_free[i]];
+        }
+}
+
+/* The scalar stiffness on the coarse space: P' C P. */
+static drape_status build_coarse_scalars(drape_approx_jacobian *s)
+{
+    coarse_matrix *c = &s->coarse;
     size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
     c->elastic = drape_arena_take(s->arena, slots, sizeof *c->elastic);
     c->damping = drape_arena_take(s->arena, slots, sizeof *c->damping);
@@ -157,17 +173,8 @@ static drape_status build_coarse_scalars(drape_approx_jacobian *s)
     if (drape_arena_status(s->arena))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < s->nodes; i++)
-        for (int32_t k = f->start[i]; k < f->start[i + 1]; k++)
-            for (int32_t a = p->start[i]; a < p->start[i + 1]; a++)
-                for (int32_t b = p->start[f->column[k]]; b < p->start[f->column[k] + 1]; b++) {
-                    int32_t slot = drape_pattern_find(&c->pattern, p->column[a], p->column[b]);
-                    double w = p->weight[a] * p->weight[b];
-                    c->elastic[slot] += w * f->elastic[k];
-                    if (f->damping)
-                        c->damping[slot] += w * f->damping[k];
-                    if (k == f->diagonal[i])
-                        c->mass[slot] += w * s->model->mass[s->model->node_of_free[i]];
-                }
+        for (int32_t k = s->scalar.start[i]; k < s->scalar.start[i + 1]; k++)
+            add_scalar(s, i, k);
     return DRAPE_OK;
 }
 
@@ -407,6 +414,20 @@ static bool read_block(const drape_pattern *p, double *values, int32_t column, i
     return any;
 }
 
+/* The same of (A + A')/2: friction makes blocks nonsymmetric. */
+static bool read_symmetric(const drape_pattern *p, double *values, int32_t column, int32_t block, double *to)
+{
+    double one[9], mirror[9];
+    const int32_t row = p->block_row[block];
+    if (!read_block(p, values, column, block, one))
+        return false;
+    read_block(p, values, row, row == column ? block : drape_pattern_find(p, column, row), mirror);
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            to[3 * r + c] = (one[3 * r + c] + mirror[3 * c + r]) / 2;
+    return true;
+}
+
 static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point, bool friction)
 {
     bool changed;
@@ -424,18 +445,9 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
     m->count = 0;
     for (int32_t j = 0; j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
-            double *to = m->block + 9 * (size_t)m->count, mirror[9];
-            int32_t i = p->block_row[k];
-            if (!read_block(p, m->values, j, k, to))
+            if (!read_symmetric(p, m->values, j, k, m->block + 9 * (size_t)m->count))
                 continue;
-            read_block(p, m->values, i, i == j ? k : drape_pattern_find(p, j, i), mirror);
-            /* b = (b + mirror')/2, because friction makes blocks nonsymmetric. */
-            double t[9];
-            for (int r = 0; r < 3; r++)
-                for (int c = 0; c < 3; c++)
-                    t[3 * r + c] = (to[3 * r + c] + mirror[3 * c + r]) / 2;
-            memcpy(to, t, sizeof t);
-            m->row[m->count] = i;
+            m->row[m->count] = p->block_row[k];
             m->column[m->count++] = j;
         }
     return friction ? drape_nonsymmetric_update(&s->friction, point, NULL) : DRAPE_OK;
@@ -501,6 +513,33 @@ static void add_coarse_block(drape_approx_jacobian *s, int32_t row, int32_t colu
             to[q * stride + r] += w * (transposed ? b[3 * q + r] : b[3 * r + q]);
 }
 
+/* Adds block k of R to the values: P' R P. */
+static void add_coarse_blocks(drape_approx_jacobian *s, int32_t k)
+{
+    const drape_prolong *p = &s->coarse.prolong;
+    const int32_t row = s->remainder.row[k], column = s->remainder.column[k];
+    const double *b = s->remainder.block + 9 * (size_t)k;
+    for (int32_t u = p->start[row]; u < p->start[row + 1]; u++)
+        for (int32_t v = p->start[column]; v < p->start[column + 1]; v++) {
+            double w = p->weight[u] * p->weight[v];
+            add_coarse_block(s, p->column[u], p->column[v], w, b, false);
+            if (row != column)
+                add_coarse_block(s, p->column[v], p->column[u], w, b, true);
+        }
+}
+
+/* Adds the pairs to the blocks. */
+static void add_coarse_pairs(drape_approx_jacobian *s)
+{
+    coarse_matrix *c = &s->coarse;
+    for (int32_t p = 0; p < s->pairs; p++) {
+        const double *h = s->h + 6 * (size_t)p;
+        for (int64_t k = c->pair_start[p]; k < c->pair_start[p + 1]; k++)
+            for (int i = 0; i < 6; i++)
+                c->sum[6 * (size_t)c->slot[k] + (size_t)i] += c->weight[k] * h[i];
+    }
+}
+
 static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
 {
     double start = drape_clock_seconds();
@@ -510,25 +549,10 @@ static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
         double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
         memcpy(c->sum + 6 * k, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
     }
-    for (int32_t p = 0; p < s->pairs; p++) {
-        const double *h = s->h + 6 * (size_t)p;
-        for (int64_t k = c->pair_start[p]; k < c->pair_start[p + 1]; k++)
-            for (int i = 0; i < 6; i++)
-                c->sum[6 * (size_t)c->slot[k] + (size_t)i] += c->weight[k] * h[i];
-    }
+    add_coarse_pairs(s);
     expand_coarse(s);
-    const drape_prolong *p = &c->prolong;
-    const remainder_matrix *m = &s->remainder;
-    for (int32_t k = 0; k < m->count; k++) {
-        const double *b = m->block + 9 * (size_t)k;
-        for (int32_t u = p->start[m->row[k]]; u < p->start[m->row[k] + 1]; u++)
-            for (int32_t v = p->start[m->column[k]]; v < p->start[m->column[k] + 1]; v++) {
-                double w = p->weight[u] * p->weight[v];
-                add_coarse_block(s, p->column[u], p->column[v], w, b, false);
-                if (m->row[k] != m->column[k])
-                    add_coarse_block(s, p->column[v], p->column[u], w, b, true);
-            }
-    }
+    for (int32_t k = 0; k < s->remainder.count; k++)
+        add_coarse_blocks(s, k);
     drape_status status = c->linear->factor(c->solver, c->values);
     s->coarse_due = status != DRAPE_OK;
     work->factorizations++;
