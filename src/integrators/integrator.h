@@ -8,7 +8,7 @@
 
 #include "base/param.h"
 #include "base/registry.h"
-#include "nonlinear/report.h"
+#include "nonlinear/solve_report.h"
 
 /* The report of a step. */
 typedef struct drape_step_info {

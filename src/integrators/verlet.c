@@ -29,7 +29,7 @@
 #include "base/lanes.h"
 #include "base/reason.h"
 #include "base/vec3.h"
-#include "integrators/stability.h"
+#include "integrators/spectrum.h"
 #include "model/support.h"
 
 #include <string.h>

@@ -8,7 +8,7 @@
 
 #include "compile/stages.h"
 #include "compile/term_builder.h"
-#include "mpi/ranks.h"
+#include "mpi/mpi_ranks.h"
 #include "sim/identity.h"
 
 #include <math.h>

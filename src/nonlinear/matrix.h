@@ -6,7 +6,7 @@
 #ifndef DRAPE_NONLINEAR_MATRIX_H
 #define DRAPE_NONLINEAR_MATRIX_H
 
-#include "nonlinear/report.h"
+#include "nonlinear/solve_report.h"
 
 /* Of conjugate gradients for each correction, at most. */
 #define DRAPE_LINEAR_ITERATIONS 60

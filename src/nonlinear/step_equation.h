@@ -20,7 +20,7 @@
 #ifndef DRAPE_NONLINEAR_STEP_EQUATION_H
 #define DRAPE_NONLINEAR_STEP_EQUATION_H
 
-#include "nonlinear/report.h"
+#include "nonlinear/solve_report.h"
 
 /* Arrays of nodes have 3 x node_count entries, arrays of free DOFs `dofs`. */
 typedef struct drape_step_equation {

@@ -2,8 +2,8 @@
  * multifrontal: factors of any regular matrix, front by front (fronts.h). A symmetric positive definite
  * matrix gets Cholesky factors (front_factors.h); any other one, L U factors with a bound on the backward
  * error of each solution (general.h), with half of the work if it is symmetric. All of them share one order
- * of elimination, one tree, and one set of tiles, and give the same bits for any number of threads. The memory
- * for Cholesky factors is taken in create, the rest for the first other matrix.
+ * of elimination, one tree, and one set of tiles, and give the same bits for any number of threads. The
+ * memory for Cholesky factors is taken in create, the rest for the first other matrix.
  */
 #include "base/finite.h"
 #include "solvers/general.h"

@@ -6,7 +6,7 @@
 #include "base/vec3.h"
 #include "drape/extend.h"
 #include "geometry/intersect.h"
-#include "integrators/stability.h"
+#include "integrators/spectrum.h"
 #include "support/bytes.h"
 
 #define ROOM 256

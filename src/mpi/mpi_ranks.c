@@ -1,6 +1,6 @@
-/* ranks.c: see ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks have the
- * same bits. */
-#include "mpi/ranks.h"
+/* mpi_ranks.c: see mpi_ranks.h. Sums are of gathered numbers in the order of the ranks, so that all ranks
+ * have the same bits. */
+#include "mpi/mpi_ranks.h"
 
 #include <nvector/nvector_parallel.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* report.c: see report.h. */
-#include "nonlinear/report.h"
+/* solve_report.c: see solve_report.h. */
+#include "nonlinear/solve_report.h"
 
 void drape_work_archive(drape_work *work, drape_archive *a)
 {

@@ -1,6 +1,6 @@
-/* report.h: the report of the solution of a nonlinear system, and the work that it took. */
-#ifndef DRAPE_NONLINEAR_REPORT_H
-#define DRAPE_NONLINEAR_REPORT_H
+/* solve_report.h: the report of the solution of a nonlinear system, and the work that it took. */
+#ifndef DRAPE_NONLINEAR_SOLVE_REPORT_H
+#define DRAPE_NONLINEAR_SOLVE_REPORT_H
 
 #include "base/archive.h"
 #include "base/reason.h"

@@ -1,10 +1,10 @@
 /*
- * file.c: see ranks.h. Each rank has items here and there in an array, and writes one block of it: the ranks
- * first send each other the items of their blocks. So every file system gets large requests, which do not
- * overlap, and a rank that cannot write, for instance because the disk is full, leaves no other waiting:
- * collective writes of MPI-IO do, in Open MPI 4.
+ * shared_file.c: see mpi_ranks.h. Each rank has items here and there in an array, and writes one block of it:
+ * the ranks first send each other the items of their blocks. So every file system gets large requests, which
+ * do not overlap, and a rank that cannot write, for instance because the disk is full, leaves no other
+ * waiting: collective writes of MPI-IO do, in Open MPI 4.
  */
-#include "mpi/ranks.h"
+#include "mpi/mpi_ranks.h"
 
 #include "base/checksum.h"
 

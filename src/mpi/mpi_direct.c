@@ -1,10 +1,10 @@
 /*
- * linear.c: the direct solver of a matrix that ranks share, MUMPS by PETSc; see ranks.h. The rows of a rank's
- * own nodes are complete in its values, and go into a matrix of PETSc of block size 3.
+ * mpi_direct.c: the direct solver of a matrix that ranks share, MUMPS by PETSc; see mpi_ranks.h. The rows of
+ * a rank's own nodes are complete in its values, and go into a matrix of PETSc of block size 3.
  *
  * MUMPS has LDL' of a symmetric matrix, whose inertia says whether it is definite, else LU.
  */
-#include "mpi/ranks.h"
+#include "mpi/mpi_ranks.h"
 
 #include <math.h>
 #include <petscksp.h>

@@ -1,6 +1,6 @@
-/* ranks.h: the ranks of base/ranks.h by MPI. */
-#ifndef DRAPE_MPI_RANKS_H
-#define DRAPE_MPI_RANKS_H
+/* mpi_ranks.h: the ranks of base/ranks.h by MPI. */
+#ifndef DRAPE_MPI_MPI_RANKS_H
+#define DRAPE_MPI_MPI_RANKS_H
 
 #include "model/model.h"
 #include "solvers/linear.h"
@@ -45,7 +45,7 @@ void drape_mpi_ranks_destroy(drape_mpi_ranks **ranks);
  * Errors: DRAPE_E_MEMORY. */
 drape_status drape_mpi_ranks_plan(drape_mpi_ranks *ranks, const drape_model *part, const int32_t *owner);
 
-/* ---- file.c: arrays of which each rank has some items, written by all ranks into one file ---- */
+/* ---- shared_file.c: arrays of which each rank has some items, written by all ranks into one file ---- */
 
 /* drape_ranks.open, write and close. */
 int drape_mpi_open(const drape_ranks *ranks, const char *path);
@@ -53,7 +53,7 @@ int drape_mpi_write(const drape_ranks *ranks, int64_t offset, bool little_endian
                     uint64_t *sum);
 int drape_mpi_close(const drape_ranks *ranks, bool durable);
 
-/* ---- linear.c: the direct solver of a matrix that ranks share (pattern->ranks) ---- */
+/* ---- mpi_direct.c: the direct solver of a matrix that ranks share (pattern->ranks) ---- */
 
 /* It is not in the table of linear solvers, as no scene names it: a run on several ranks has it in place of
  * direct ones (drape_linear_of). */

@@ -1,9 +1,9 @@
 /*
- * stability.h: the fastest waves at a state, for integrators that are unstable if these are faster than the
+ * spectrum.h: the fastest waves at a state, for integrators that are unstable if these are faster than the
  * step allows. Matrix-free: a product with K or D is a difference of two forces.
  */
-#ifndef DRAPE_INTEGRATORS_STABILITY_H
-#define DRAPE_INTEGRATORS_STABILITY_H
+#ifndef DRAPE_INTEGRATORS_SPECTRUM_H
+#define DRAPE_INTEGRATORS_SPECTRUM_H
 
 #include "assemble/system.h"
 

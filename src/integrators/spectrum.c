@@ -1,5 +1,5 @@
 /*
- * stability.c: the largest eigenvalue of A = M^-1/2 K M^-1/2 by Lanczos' recurrence, a power iteration u, A
+ * spectrum.c: the largest eigenvalue of A = M^-1/2 K M^-1/2 by Lanczos' recurrence, a power iteration u, A
  * u, A^2 u ... that keeps all earlier powers: the largest eigenvalue of its tridiagonal matrix T is the
  * largest Ritz value of the whole sequence (Parlett 1998, 13). The power iteration alone needs hundreds of
  * products if the fastest waves of a sheet are close together.
@@ -11,7 +11,7 @@
  * rounding x, which grows with the distance from the origin, is 1e-10 of the difference of the forces for
  * each edge of that distance.
  */
-#include "integrators/stability.h"
+#include "integrators/spectrum.h"
 
 #include <float.h>
 #include <math.h>
