@@ -122,12 +122,12 @@ double drape_verlet_project(const drape_verlet_contact *contact, double t0, doub
 static double apply_friction(const drape_verlet_contact *contact, const drape_collider *c,
                              const double velocity[3], const double *n, const double *v, double *g)
 {
-    double press = vec3_dot(g, n), tangential[3], slip[3], power = 0;
-    if (!(press > 0))
+    double normal = vec3_dot(g, n), tangential[3], slip[3], power = 0;
+    if (!(normal > 0))
         return 0;
     for (int k = 0; k < 3; k++)
-        tangential[k] = -g[k] + press * n[k];
-    double force = vec3_norm(tangential), left = fmax(force - c->friction * press, 0);
+        tangential[k] = -g[k] + normal * n[k];
+    double force = vec3_norm(tangential), left = fmax(force - c->friction * normal, 0);
     vec3_sub(v, velocity, slip);
     for (int k = 0; k < 3; k++) {
         const double before = g[k];
@@ -189,14 +189,15 @@ drape_status drape_verlet_self_create(drape_arena *arena, const drape_model *m, 
     return drape_neighbours_create(arena, m->node_count, out->reach, &out->neighbours);
 }
 
-/* Moves node i by the rule. near NULL: all points, of which there are count. */
-static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
+/* Moves node i by the rule. others (count): the points that push it; NULL: all `count` points of the
+ * model. */
+static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *others, int count, double share,
                       double *x)
 {
     double *own = x + 3 * (size_t)i, sum[3] = {0}, square_of_reach = s->reach * s->reach;
     int pushing = 0;
     for (int k = 0; k < count; k++) {
-        const int32_t j = near ? near[k] : k;
+        const int32_t j = others ? others[k] : k;
         double d[3];
         if (s->model->sewn && s->model->sewn[i] == s->model->sewn[j])
             continue;
@@ -216,28 +217,28 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
 
 /* Finds the near points that push a point. NULL: all points do, as in a pile of cloth much thicker than its
  * mesh is fine, where a point has more near points than a list can hold. */
-static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
-                     int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
+static int find_others(const drape_verlet_self *s, int32_t i, const double *x,
+                       int32_t list[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **others)
 {
-    int count = drape_neighbours_of(&s->neighbours, i, x + 3 * (size_t)i, room, near);
+    int count = drape_neighbours_of(&s->neighbours, i, x + 3 * (size_t)i, list, others);
     if (count < 0) {
-        *near = NULL;
+        *others = NULL;
         count = s->model->node_count;
     }
     if (!s->box)
         return count;
-    /* Only the near points in the box of the point push, in `room`, which may be *near; of all points, the
+    /* Only the near points in the box of the point push, in `list`, which may be *others; of all points, the
      * first that fit. */
     int number = 0;
     for (int k = 0; k < count && number < DRAPE_MAX_NEIGHBOURS; k++) {
-        const int32_t j = *near ? (*near)[k] : k;
+        const int32_t j = *others ? (*others)[k] : k;
         double d[3];
         vec3_sub(x + 3 * (size_t)i, x + 3 * (size_t)j, d);
-        room[number] = j;
-        number += (s->box[j] == s->box[i]) & (j != i) & (*near || vec3_dot(d, d) < s->reach * s->reach);
+        list[number] = j;
+        number += (s->box[j] == s->box[i]) & (j != i) & (*others || vec3_dot(d, d) < s->reach * s->reach);
     }
     count = number;
-    *near = room;
+    *others = list;
     return count;
 }
 
@@ -257,12 +258,12 @@ void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
         s->box[i] = box;
     }
     for (int32_t i = 0; i < s->model->node_count && !(s->cancel && atomic_load(s->cancel)); i++) {
-        int32_t room[DRAPE_MAX_NEIGHBOURS + 1];
-        const int32_t *near;
+        int32_t list[DRAPE_MAX_NEIGHBOURS + 1];
+        const int32_t *others;
         if (s->model->pinned[i])
             continue;
-        const int count = find_near(s, i, x, room, &near);
-        push_node(s, i, near, count, share, x);
+        const int count = find_others(s, i, x, list, &others);
+        push_node(s, i, others, count, share, x);
         drape_neighbours_moved(&s->neighbours, i, x + 3 * (size_t)i);
     }
 }

@@ -39,11 +39,12 @@ typedef struct drape_matrix {
     void *self;
 } drape_matrix;
 
-/* Makes what newton_k corrects with in steps of dt [s]: `usual`, and `cheap` for the least effort unless that
- * is the same. It is whichever factored_jacobian.h says; with contact, where both serve, both: contact needs
- * most of its iterations for the active set, which costs less without factors.
+/* Makes what newton_k corrects with in steps of dt [s]. *usual: the matrix that factored_jacobian.h says,
+ * factored or approximate. *approximate: with contact, where the usual matrix is a factored one and an
+ * approximate one would serve, too, that one for the least effort: contact takes most of the iterations for
+ * its active set, which costs less without factors; else there is none.
  * Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then both must be destroyed. */
 drape_status drape_matrix_choose(drape_arena *arena, drape_system *system, double dt, drape_matrix *usual,
-                                 drape_matrix *cheap);
+                                 drape_matrix *approximate);
 
 #endif

@@ -81,11 +81,11 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {DRAPE_NEWTON_
 struct drape_newton {
     drape_step_equation *equation;
     double values[DRAPE_NEWTON_PARAM_COUNT];
-    bool searches;              /* globalization `work` */
-    bool lenient;               /* states that have not converged are usable */
-    bool friction;              /* matrices with positive parts are others than without, in contact too */
-    drape_matrix usual, cheap;  /* cheap.ops NULL: there is no other */
-    const drape_matrix *matrix; /* of this solve */
+    bool searches; /* globalization `work` */
+    bool lenient;  /* states that have not converged are usable */
+    bool friction; /* matrices with positive parts are others than without, in contact too */
+    drape_matrix usual, approximate; /* approximate.ops NULL: there is only the usual one */
+    const drape_matrix *matrix;      /* of this solve */
     SUNContext sun;
     void *kin;
     drape_sun_shell shell;
@@ -114,7 +114,7 @@ struct drape_newton {
         further;          /* [s] when the last iteration began, what it took, of those beyond the least */
     bool positive;        /* the present matrix has the positive parts; after a search, the next one has */
     bool indefinite;      /* the exact matrix was at the last iterate where it was tried */
-    bool near_enough;     /* what is left is as short as the effort asks */
+    bool error_within;    /* the estimated error is within what the effort asks */
     drape_status failure; /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
@@ -227,14 +227,14 @@ static void begin(drape_newton *s)
 {
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
-    s->matrix = s->effort.cheap && s->cheap.ops ? &s->cheap : &s->usual;
+    s->matrix = s->effort.cheap && s->approximate.ops ? &s->approximate : &s->usual;
     if (s->matrix->ops && s->matrix->ops->begin)
         s->matrix->ops->begin(s->matrix->self, !s->effort.cheap, s->effort.linear_iterations);
     s->corrections = 0;
     s->residual = s->rounding = INFINITY;
     s->start = s->left = s->first = s->error = NAN;
     s->seconds = s->further = 0;
-    s->positive = s->indefinite = s->near_enough = false;
+    s->positive = s->indefinite = s->error_within = false;
     s->failure = DRAPE_OK;
     drape_step_equation_predict_contact(e, NULL);
     if (!s->searches)
@@ -283,7 +283,7 @@ static drape_status guess_linearized(drape_newton *s, double *d)
 /* ---- Residual ---- */
 
 /* Whether F has stopped falling because it is the rounding error of its forces. */
-static bool is_rounding(drape_newton *s, const double *d, bool *finite)
+static bool has_stalled(drape_newton *s, const double *d, bool *finite)
 {
     drape_step_equation *e = s->equation;
     const double before = s->residual;
@@ -351,7 +351,7 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
         s->start = isnan(s->start) ? s->left : s->start;
     }
     const drape_status status = s->searches && finite ? judge_islands(s, &done) : DRAPE_OK;
-    done = done || (finite && (s->near_enough || is_rounding(s, d, &finite)));
+    done = done || (finite && (s->error_within || has_stalled(s, d, &finite)));
     const bool spent = finite && !done && is_late(s);
     for (size_t i = 0; i < e->dofs; i++)
         out[i] = done || spent || e->weight[i / 3] == 0 ? 0 : e->f[i];
@@ -431,11 +431,11 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
         if (!(now > bound) || !(by_residual || by_gain || by_error) ||
             !correct_again(s, d, p, &length, &status))
             return status < 0 ? status : DRAPE_OK;
-        const bool near =
+        const bool within =
             by_error && s->error <= effort->error && (drape_stopping_is_small(&s->stopping) || !direct);
-        const bool made =
-            direct && (near || by_residual || (by_gain && drape_stopping_keep_small(&s->stopping, s->step)));
-        s->near_enough = near;
+        const bool made = direct && (within || by_residual ||
+                                     (by_gain && drape_stopping_keep_small(&s->stopping, s->step)));
+        s->error_within = within;
         if (by_gain)
             drape_stopping_finish_small(&s->stopping);
         if (!made || drape_step_equation_make_feasible(e, s->step) < 1)
@@ -443,7 +443,7 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
         drape_line_search_along(&s->search, d, p, 1, s->step);
         for (size_t i = 0; i < e->dofs; i++)
             p[i] += s->step[i];
-        if (!by_residual || near || !s->search.evaluated || s->search.shortest < 1)
+        if (!by_residual || within || !s->search.evaluated || s->search.shortest < 1)
             return DRAPE_OK;
         before = now;
     }
@@ -551,10 +551,11 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         report->reason = DRAPE_REASON_CONVERGED;
         return DRAPE_OK;
     }
-    if (!status && (s->near_enough || s->stopping.ended_by_error)) {
-        report->reason = s->near_enough ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR;
+    if (!status && (s->error_within || s->stopping.ended_by_error)) {
+        report->reason =
+            s->error_within ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR;
         report->tolerance = NAN; /* the residual has none */
-        report->by_error = !s->near_enough;
+        report->by_error = !s->error_within;
         return DRAPE_OK;
     }
     double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;
@@ -665,7 +666,7 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
     drape_system *system = s->equation->system;
     drape_status status;
     if (dt > 0) {
-        status = drape_matrix_choose(arena, system, dt, &s->usual, &s->cheap);
+        status = drape_matrix_choose(arena, system, dt, &s->usual, &s->approximate);
     } else {
         s->usual.ops = &drape_exact_jacobian_ops;
         status = drape_exact_jacobian_create(arena, system,
@@ -753,7 +754,7 @@ void drape_newton_destroy(drape_newton **newton)
         return;
     KINFree(&s->kin);
     destroy_matrix(&s->usual);
-    destroy_matrix(&s->cheap);
+    destroy_matrix(&s->approximate);
     drape_sun_shell_destroy(&s->shell);
     N_VDestroy(s->unknown);
     N_VDestroy(s->ones);
@@ -794,8 +795,8 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     drape_work_archive(&s->equation->work, a);
     if (s->usual.ops)
         s->usual.ops->archive(s->usual.self, a);
-    if (s->cheap.ops)
-        s->cheap.ops->archive(s->cheap.self, a);
+    if (s->approximate.ops)
+        s->approximate.ops->archive(s->approximate.self, a);
 }
 
 #define KINSOL_VECTORS 8 /* six of its own, and two of weights */
@@ -804,5 +805,5 @@ size_t drape_newton_bytes(const drape_newton *s)
 {
     return KINSOL_VECTORS * s->equation->dofs * sizeof(double) +
            (s->usual.ops ? s->usual.ops->bytes(s->usual.self) : 0) +
-           (s->cheap.ops ? s->cheap.ops->bytes(s->cheap.self) : 0);
+           (s->approximate.ops ? s->approximate.ops->bytes(s->approximate.self) : 0);
 }

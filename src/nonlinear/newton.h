@@ -84,8 +84,8 @@ typedef struct drape_newton_effort {
                         contact, some more; INFINITY: none */
     bool keeps;      /* when all is spent, what is nearer than the guess is accepted */
     double linear_tolerance; /* relative residual that iterative solvers leave in a correction */
-    /* Of a matrix of matrix.h: iterations of conjugate gradients; whether the cheap one corrects, without
-     * friction. */
+    /* Of a matrix of matrix.h: the most iterations of conjugate gradients in a correction; cheap: corrections
+     * are by the approximate matrix, if there is one besides the usual one, and without friction. */
     int linear_iterations;
     bool cheap;
 } drape_newton_effort;

@@ -2,9 +2,9 @@
  * system_matrix.h: a matrix in the pattern of a system, and the linear solver that factors it. Contact may
  * couple new nodes at any point: the matrix then takes the new pattern, and its solver is created again.
  *
- * An unsymmetric matrix A may be solved with by the factors of a symmetric one near it: GMRES, preconditioned
- * by these factors (solvers/refine.h), reduces the residual until it is within a tolerance or a cycle has
- * ended.
+ * The matrix that is factored may be a symmetric approximation of the matrix A of the equations. Then each
+ * solution is corrected by GMRES, preconditioned by the factors (solvers/refine.h), until its residual with A
+ * is within a tolerance or a cycle has ended.
  */
 #ifndef DRAPE_NONLINEAR_SYSTEM_MATRIX_H
 #define DRAPE_NONLINEAR_SYSTEM_MATRIX_H
@@ -25,7 +25,7 @@ typedef struct drape_system_matrix {
     double *more[2];              /* (nonzeros) further matrices, which the solver does not use */
     double *positions;            /* (n) scratch; NULL: the solver has no use for positions */
     double correction_tolerance;  /* of |b|, that GMRES leaves in a residual; 0: it is not used */
-    bool corrects;                /* `values` are only near `exact`, with which solves solve */
+    bool corrects;                /* `values` only approximate `exact`: solutions are corrected */
     double *exact;                /* (nonzeros) A; NULL without a correction tolerance */
     drape_refine refine;
     double tolerance;                   /* relative residual that iterative solvers may leave; 0: rounding */
