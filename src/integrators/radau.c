@@ -203,6 +203,12 @@ static void weights_of_position(double p, double w[STAGES + 1])
         w[i] = p / 2 * (left[i] + right[i]);
 }
 
+/* The velocity of a free DOF, by these weights. */
+static double velocity_at(const polynomial *p, const double w[STAGES + 1], int64_t k)
+{
+    return w[0] * p->v[k] + w[1] * p->stage[0][k] + w[2] * p->stage[1][k] + w[3] * p->stage[2][k];
+}
+
 /* Whether the last polynomial says something about a step of size h. In contact its extrapolation costs more
  * iterations than it saves. */
 static bool extrapolates(const radau_state *s, double h)
@@ -220,8 +226,7 @@ static void interpolate(void *state, double time, double *x)
         return;
     weights_of_position((time - p->t) / p->h, w);
     for (int64_t i = 0; i < s->n; i++)
-        x[node_at(s, i)] = p->x[i] + p->h * (w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] +
-                                             w[3] * p->stage[2][i]);
+        x[node_at(s, i)] = p->x[i] + p->h * velocity_at(p, w, i);
 }
 
 static void interpolate_velocities(void *state, double time, double *v)
@@ -233,8 +238,7 @@ static void interpolate_velocities(void *state, double time, double *v)
         return;
     weights_of_velocity((time - p->t) / p->h, w);
     for (int64_t i = 0; i < s->n; i++)
-        v[node_at(s, i)] =
-            w[0] * p->v[i] + w[1] * p->stage[0][i] + w[2] * p->stage[1][i] + w[3] * p->stage[2][i];
+        v[node_at(s, i)] = velocity_at(p, w, i);
 }
 
 /* ---- Forces ---- */
@@ -336,10 +340,9 @@ static drape_status guess_stages(radau_state *s, double h)
             if (kind == EXTRAPOLATED)
                 weights_of_velocity(1 + fraction[i] * h / last->h, w);
             for (int64_t k = 0; k < s->n; k++)
-                s->rate[i][k] = kind == EXTRAPOLATED ? w[0] * last->v[k] + w[1] * last->stage[0][k] +
-                                                           w[2] * last->stage[1][k] + w[3] * last->stage[2][k]
-                                : kind == UNIFORM ? p->v[k]
-                                                  : 0;
+                s->rate[i][k] = kind == EXTRAPOLATED ? velocity_at(last, w, k)
+                                : kind == UNIFORM    ? p->v[k]
+                                                     : 0;
         }
         combine(s->n, coefficients, h, s->rate, s->z);
         status = evaluate_stages(s, h);

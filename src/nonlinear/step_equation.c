@@ -85,14 +85,20 @@ bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
     return drape_system_agree_finite(s->system, s->f, s->dofs);
 }
 
-double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
+/* x_ahead: the end of the step p from the last point. */
+static void look_ahead(drape_step_equation *s, const double *p)
 {
-    if (!s->x_ahead)
-        return 1;
     memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
     drape_ranks_fetch(s->ranks, s->x_ahead);
+}
+
+double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
+{
+    if (!s->x_ahead)
+        return 1;
+    look_ahead(s, p);
     double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, false, NULL);
     for (size_t i = 0; fraction < 1 && i < s->dofs; i++)
         p[i] *= fraction;
@@ -102,10 +108,7 @@ double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
 bool drape_step_equation_shorten_nodes(drape_step_equation *s, double *p, double *fraction)
 {
     for (int pass = 0; pass < MAX_PASSES; pass++) {
-        memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
-        for (size_t i = 0; i < s->dofs; i++)
-            s->x_ahead[drape_step_equation_at(s, i)] += p[i];
-        drape_ranks_fetch(s->ranks, s->x_ahead);
+        look_ahead(s, p);
         if (drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, pass > 0, fraction) == 1)
             return true;
         for (size_t i = 0; i < s->dofs; i++)
