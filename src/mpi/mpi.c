@@ -178,7 +178,7 @@ static drape_status part_check(const drape_model *m)
     const struct {
         bool there;
         const char *pointer, *text;
-    } not [] = {
+    } refused[] = {
         {m->contact.self, "/self_contact", "self-contact"},
         {m->contact.no_room == DRAPE_NO_ROOM_RELAX, "/contact/no_room", "cloth that is relaxed"},
         {m->event_count > 0, "/events", "events"},
@@ -186,10 +186,10 @@ static drape_status part_check(const drape_model *m)
         {m->untangle.given, "/untangle", "untangling"},
         {m->supports_move, "/cloth", "pins that hold nodes in some directions and move"},
     };
-    for (size_t i = 0; i < sizeof not / sizeof *not ; i++)
-        if (not [i].there)
-            return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, not [i].pointer,
-                                 "a run on several ranks cannot have %s", not [i].text);
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+        if (refused[i].there)
+            return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, refused[i].pointer,
+                                 "a run on several ranks cannot have %s", refused[i].text);
     for (int32_t i = 0; i < m->term_count; i++)
         if (drape_term_turns(&m->terms[i]))
             return drape_fail_at(m->ctx, DRAPE_E_ARGUMENT, "/cloth",
