@@ -78,13 +78,15 @@ const char *const drape_newton_globalizations[] = {"line_search", "none", "work"
 
 const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {DRAPE_NEWTON_PARAMS};
 
+enum { USUAL, APPROXIMATE, MATRICES }; /* of drape_matrix_choose; the exact Jacobian is the usual one */
+
 struct drape_newton {
     drape_step_equation *equation;
     double values[DRAPE_NEWTON_PARAM_COUNT];
     bool searches; /* globalization `work` */
     bool lenient;  /* states that have not converged are usable */
     bool friction; /* matrices with positive parts are others than without, in contact too */
-    drape_matrix usual, approximate; /* approximate.ops NULL: there is only the usual one */
+    drape_matrix matrices[MATRICES]; /* those without ops are not there */
     const drape_matrix *matrix;      /* of this solve */
     SUNContext sun;
     void *kin;
@@ -227,7 +229,7 @@ static void begin(drape_newton *s)
 {
     drape_step_equation *e = s->equation;
     drape_step_equation_begin(e);
-    s->matrix = s->effort.cheap && s->approximate.ops ? &s->approximate : &s->usual;
+    s->matrix = &s->matrices[s->effort.cheap && s->matrices[APPROXIMATE].ops ? APPROXIMATE : USUAL];
     if (s->matrix->ops && s->matrix->ops->begin)
         s->matrix->ops->begin(s->matrix->self, !s->effort.cheap, s->effort.linear_iterations);
     s->corrections = 0;
@@ -666,14 +668,14 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s, double dt
     drape_system *system = s->equation->system;
     drape_status status;
     if (dt > 0) {
-        status = drape_matrix_choose(arena, system, dt, &s->usual, &s->approximate);
+        status = drape_matrix_choose(arena, system, dt, &s->matrices[USUAL], &s->matrices[APPROXIMATE]);
     } else {
-        s->usual.ops = &drape_exact_jacobian_ops;
+        s->matrices[USUAL].ops = &drape_exact_jacobian_ops;
         status = drape_exact_jacobian_create(arena, system,
                                              drape_linear_of(s->equation->ranks,
                                                              (int)s->values[DRAPE_NEWTON_LINEAR_SOLVER],
                                                              (int64_t)s->equation->dofs),
-                                             s->searches, (drape_exact_jacobian **)&s->usual.self);
+                                             s->searches, (drape_exact_jacobian **)&s->matrices[USUAL].self);
     }
     if (!status)
         status = drape_sun_shell_create(arena->ctx, s->sun, s, setup, correct, &s->shell);
@@ -741,20 +743,15 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     return drape_reserve_close(&reserve, arena->ctx, status);
 }
 
-static void destroy_matrix(drape_matrix *matrix)
-{
-    if (matrix->ops)
-        matrix->ops->destroy(matrix->self);
-}
-
 void drape_newton_destroy(drape_newton **newton)
 {
     drape_newton *s = *newton;
     if (!s)
         return;
     KINFree(&s->kin);
-    destroy_matrix(&s->usual);
-    destroy_matrix(&s->approximate);
+    for (int k = 0; k < MATRICES; k++)
+        if (s->matrices[k].ops)
+            s->matrices[k].ops->destroy(s->matrices[k].self);
     drape_sun_shell_destroy(&s->shell);
     N_VDestroy(s->unknown);
     N_VDestroy(s->ones);
@@ -768,7 +765,7 @@ void drape_newton_destroy(drape_newton **newton)
 drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
                                  const drape_pattern **pattern, const double **values)
 {
-    return drape_exact_jacobian_at(s->usual.self, point, mass_weight, pattern, values);
+    return drape_exact_jacobian_at(s->matrices[USUAL].self, point, mass_weight, pattern, values);
 }
 
 const double *drape_newton_values(const drape_newton *s)
@@ -793,17 +790,17 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     drape_archive_mark(a, "newton");
     drape_archive_doubles(a, s->equation->f, s->equation->dofs);
     drape_work_archive(&s->equation->work, a);
-    if (s->usual.ops)
-        s->usual.ops->archive(s->usual.self, a);
-    if (s->approximate.ops)
-        s->approximate.ops->archive(s->approximate.self, a);
+    for (int k = 0; k < MATRICES; k++)
+        if (s->matrices[k].ops)
+            s->matrices[k].ops->archive(s->matrices[k].self, a);
 }
 
 #define KINSOL_VECTORS 8 /* six of its own, and two of weights */
 
 size_t drape_newton_bytes(const drape_newton *s)
 {
-    return KINSOL_VECTORS * s->equation->dofs * sizeof(double) +
-           (s->usual.ops ? s->usual.ops->bytes(s->usual.self) : 0) +
-           (s->approximate.ops ? s->approximate.ops->bytes(s->approximate.self) : 0);
+    size_t bytes = KINSOL_VECTORS * s->equation->dofs * sizeof(double);
+    for (int k = 0; k < MATRICES; k++)
+        bytes += s->matrices[k].ops ? s->matrices[k].ops->bytes(s->matrices[k].self) : 0;
+    return bytes;
 }
