@@ -109,9 +109,7 @@ static bool find_entry_positions(drape_fronts *s)
     return true;
 }
 
-/* The position of each row of a front in its parent, counted from the beginning of a column: in the
- * parent's panel, and in its update, there from the tile of the first strip. in_update -1: the parent
- * factors the row. False if a panel is too large for 32-bit positions. */
+/* Sets in_panel and in_update. False if a panel is too large for 32-bit positions. */
 static bool find_row_positions(drape_fronts *s)
 {
     for (int32_t i = 0; i < s->e.count; i++) {

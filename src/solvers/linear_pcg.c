@@ -36,35 +36,21 @@ typedef struct fallback {
 
 extern const drape_linear_ops drape_linear_multifrontal;
 
-static void fallback_destroy(fallback *f)
+/* Passes the threads and the flag on to the solver, if there is one. */
+static void attach_fallback(const fallback *f)
 {
-    drape_linear_destroy(f->ops, &f->solver);
-    drape_arena_free(&f->arena);
-}
-
-static void fallback_use_threads(fallback *f, drape_pool *pool)
-{
-    f->pool = pool;
     if (f->solver && f->ops->use_threads)
-        f->ops->use_threads(f->solver, pool);
-}
-
-static void fallback_watch(fallback *f, const atomic_bool *const *cancel)
-{
-    f->cancel = cancel;
+        f->ops->use_threads(f->solver, f->pool);
     if (f->solver && f->ops->watch)
-        f->ops->watch(f->solver, cancel);
+        f->ops->watch(f->solver, f->cancel);
 }
 
 static drape_status create_fallback(fallback *f)
 {
-    drape_status status = f->ops->create(&f->arena, f->pattern, &f->solver);
-    if (status) {
-        fallback_destroy(f);
-        return status;
-    }
-    fallback_use_threads(f, f->pool);
-    fallback_watch(f, f->cancel);
+    const drape_status status = f->ops->create(&f->arena, f->pattern, &f->solver);
+    if (status)
+        drape_arena_free(&f->arena);
+    attach_fallback(f);
     return status;
 }
 
@@ -118,7 +104,9 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 
 static void destroy(void **state)
 {
-    fallback_destroy(&((pcg_state *)*state)->fallback);
+    fallback *f = &((pcg_state *)*state)->fallback;
+    drape_linear_destroy(f->ops, &f->solver);
+    drape_arena_free(&f->arena);
 }
 
 /* ---- Values ---- */
@@ -151,12 +139,16 @@ static drape_status factor_general(pcg_state *s)
 
 static void use_threads(void *state, drape_pool *pool)
 {
-    fallback_use_threads(&((pcg_state *)state)->fallback, pool);
+    fallback *f = &((pcg_state *)state)->fallback;
+    f->pool = pool;
+    attach_fallback(f);
 }
 
 static void watch(void *state, const atomic_bool *const *cancel)
 {
-    fallback_watch(&((pcg_state *)state)->fallback, cancel);
+    fallback *f = &((pcg_state *)state)->fallback;
+    f->cancel = cancel;
+    attach_fallback(f);
 }
 
 static void set_positions(void *state, const double *x)
