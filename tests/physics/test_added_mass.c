@@ -1,8 +1,8 @@
 /*
  * test_added_mass.c: air.added_mass against closed forms: apparent masses, frequencies, lift and induced drag
  * of a wing of low aspect ratio, Munk's moment, what is conserved in still air and in steady wind, the
- * work of gusts, orders of convergence, and which integrators take it. The onset of flutter is a reference of
- * `drape validate`: strip_flutter, flag_flutter.
+ * work of gusts, and which integrators take it. The onset of flutter is a reference of `drape validate`:
+ * strip_flutter, flag_flutter.
  */
 #include "assemble/check.h"
 #include "base/vec3.h"
@@ -256,44 +256,6 @@ END_TEST
 
 /* ---- Integration ---- */
 
-static void end_of(const char *method, double h, double *x)
-{
-    scene s = open_free(", 'wind': [3, 1, 0.5], 'ramp': 0.12", method, h);
-    scene_advance(&s, 0.05);
-    memcpy(x, drape_sim_positions(s.sim), 3 * NODES * sizeof *x);
-    scene_close(&s);
-}
-
-static double distance(const double *x, const double *y)
-{
-    double sum = 0;
-    for (size_t i = 0; i < 3 * NODES; i++)
-        sum += (x[i] - y[i]) * (x[i] - y[i]);
-    return sqrt(sum);
-}
-
-/* The distances of three runs, each of half the step of the one before, have the ratio 2^order: 2 and 4,
- * within 15 % at these steps. All approach the same motion: extrapolation leaves less than 0.3 of the last
- * distance. */
-START_TEST(orders)
-{
-    static const double order[] = {2, 4, 4}, coarsest[] = {4e-5, 2e-4, 2e-4}; /* [s] */
-    double ends[EXACT][3 * NODES], last[EXACT];
-    for (int m = 0; m < EXACT; m++) {
-        double x[3][3 * NODES];
-        for (int k = 0; k < 3; k++)
-            end_of(methods[m], coarsest[m] / (1 << k), x[k]);
-        last[m] = distance(x[1], x[2]);
-        const double ratio = distance(x[0], x[1]) / last[m];
-        assert_below(fabs(ratio / order[m] - 1), 0.15);
-        for (size_t i = 0; i < 3 * NODES; i++)
-            ends[m][i] = x[2][i] + (x[2][i] - x[1][i]) / (order[m] - 1);
-    }
-    for (int m = 0; m + 1 < EXACT; m++)
-        assert_below(distance(ends[m], ends[EXACT - 1]), 0.3 * (last[m] + last[EXACT - 1]));
-}
-END_TEST
-
 static void blow(void *user, double t, int32_t count, const double *x, double *w, double *gradient)
 {
     (void)user;
@@ -363,4 +325,4 @@ START_TEST(refusals)
 END_TEST
 
 SUITE("added_mass", apparent_mass, lift_and_moment, frequency_in_still_air, momentum_is_conserved,
-      account_of_energy, orders, wind_of_a_host, refusals)
+      account_of_energy, wind_of_a_host, refusals)

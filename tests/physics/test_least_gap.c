@@ -7,7 +7,6 @@
 #include "contact/barrier.h"
 #include "contact/contact_parts.h"
 #include "support/bytes.h"
-#include "support/crossings.h"
 #include "support/folder.h"
 #include "support/scene.h"
 
@@ -191,78 +190,5 @@ START_TEST(a_checkpoint_keeps_it)
 }
 END_TEST
 
-#define AROUND 10
-#define ALONG  9
-#define RADIUS 0.1
-
-/* A tube whose nodes are numbered ring by ring, in tube.obj. */
-static void write_tube(void)
-{
-    FILE *file = fopen("tube.obj", "w");
-    ck_assert_ptr_nonnull(file);
-    for (int j = 0; j < ALONG; j++)
-        for (int i = 0; i < AROUND; i++) {
-            const double angle = 2 * acos(-1.0) * (i + 0.5 * (j % 2)) / AROUND;
-            fprintf(file, "v %.17g %.17g %.17g\n", 0.05 * j, RADIUS * cos(angle), RADIUS * sin(angle));
-        }
-    for (int j = 0; j + 1 < ALONG; j++)
-        for (int i = 0; i < AROUND; i++) {
-            const int a = j * AROUND + i + 1, b = j * AROUND + (i + 1) % AROUND + 1, c = a + AROUND,
-                      d = b + AROUND;
-            if (j % 2)
-                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
-            else
-                fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, c, b, d, c);
-        }
-    fclose(file);
-}
-
-/* The pins of both ends, each node on a track of its own: the ends turn against each other by `degrees`
- * each. */
-static const char *wringing(double degrees)
-{
-    static char text[6000];
-    size_t used = 0;
-    for (int end = 0; end < 2; end++)
-        for (int i = 0; i < AROUND; i++) {
-            const double angle = 2 * acos(-1.0) * i / AROUND, y = RADIUS * cos(angle),
-                         z = RADIUS * sin(angle);
-            used += (size_t)snprintf(text + used, sizeof text - used, "%s{'nodes': [%d], 'track': [",
-                                     used ? ", " : "", end ? (ALONG - 1) * AROUND + i : i);
-            for (int k = 0; k <= 8; k++) {
-                const double to = angle + (end ? -1 : 1) * degrees * acos(-1.0) / 180 * k / 8;
-                used += (size_t)snprintf(text + used, sizeof text - used, "%s[%g,[0,%.4f,%.4f]]",
-                                         k ? "," : "", 0.2 * k, RADIUS * cos(to) - y, RADIUS * sin(to) - z);
-            }
-            used += (size_t)snprintf(text + used, sizeof text - used, "]}");
-            ck_assert_uint_lt(used, sizeof text);
-        }
-    return text;
-}
-
-/* A tube that is wrung by 2 x 200 degrees, without gravity, so that inertia alone would make contact too
- * soft. */
-START_TEST(wrung)
-{
-    static const char *const some[] = {"be", "newton_k"};
-    folder_enter();
-    folder_write("tip.obj", tetrahedron);
-    write_tube();
-    for (int k = 0; k < 2; k++) {
-        crossings_run run = {0};
-        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'file': 'tube.obj'}, 'pins': [%s], " MATERIAL
-                             ", " TERMS "]}], 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': "
-                             "4e-3}, 'gravity': [0, 0, 0], %s,"
-                             " 'duration': 1.6, 'frame_rate': 30}",
-                             wringing(200), 1e6, method_of(some[k], 0.02));
-        ck_assert_int_eq(drape_sim_observe(s.sim, crossings_observe, &run), DRAPE_OK);
-        scene_advance(&s, 1.6);
-        ck_assert_msg(run.crossed_states + run.crossed_frames == 0, "%s: %s", some[k], run.first);
-        scene_close(&s);
-    }
-    folder_leave();
-}
-END_TEST
-
-SUITE("least_gap", wrung, stiffening_is_work, what_begins_inside_is_pushed_out_gently,
-      rounding_does_not_add_up, stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)
+SUITE("least_gap", stiffening_is_work, what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up,
+      stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)

@@ -101,111 +101,6 @@ START_TEST(one_cell_moves_as_each_of_three)
 }
 END_TEST
 
-#define TILE 4 /* cells of a tile across */
-#define ROWS 5
-
-/* Tiles of cells with displaced nodes and diagonals of both directions: bend.midedge then measures nine
- * hinges in a triangle, and two of its nodes may be images of each other's neighbours. */
-static void tiles(int count, drape_mesh_def *mesh, double *x, int32_t *triangle)
-{
-    const int across = TILE * count + 1;
-    for (int r = 0; r < ROWS; r++)
-        for (int c = 0; c < across; c++) {
-            const double shift = 0.3 * sin(5.0 * (c % TILE) + 7.0 * r + 1) * (r % (ROWS - 1) > 0);
-            const double at[3] = {0.05 * (c + shift), 0, 0.05 * (r + 0.7 * shift)};
-            memcpy(x + 3 * (across * r + c), at, sizeof at);
-        }
-    int32_t *t = triangle;
-    for (int r = 0; r + 1 < ROWS; r++)
-        for (int c = 0; c + 1 < across; c++, t += 6) {
-            const int32_t a = across * r + c, b = a + 1, d = a + across, e = d + 1;
-            const bool up = (c % TILE * 3 + r) % 2;
-            memcpy(t, up ? (int32_t[]){a, b, e, a, e, d} : (int32_t[]){a, b, d, b, e, d}, 6 * sizeof *t);
-        }
-    mesh->positions = x;
-    mesh->node_count = (size_t)(ROWS * across);
-    mesh->triangles = triangle;
-    mesh->triangle_count = (size_t)(t - triangle) / 3;
-}
-
-/* A cantilever of such tiles, held at its first two rows, with a weight in each. */
-static scene cantilever(int count, const char *bending)
-{
-    static double x[3 * ROWS * (3 * TILE + 1)];
-    static int32_t triangle[6 * ROWS * 3 * TILE];
-    const int across = TILE * count + 1;
-    int32_t weights[3], left[ROWS], right[ROWS], top[2 * (3 * TILE + 1)];
-    scene s = scene_empty();
-    drape_scene_def def;
-    drape_cloth_def cloth;
-    drape_pin_def pin;
-    drape_mass_def mass;
-    drape_periodic_def periodic;
-    const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}, {bending, NULL, 0}};
-    const drape_setting material[] = {{.name = "young_modulus", .number = 1e5},
-                                      {.name = "poisson_ratio", .number = 0.3},
-                                      {.name = "thickness", .number = 1e-2},
-                                      {.name = "areal_density", .number = 0.2}};
-    const drape_setting settings[] = {{.name = "tolerance", .number = 1e-12}};
-    drape_scene_def_init(&def, sizeof def);
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_pin_def_init(&pin, sizeof pin);
-    drape_mass_def_init(&mass, sizeof mass);
-    drape_periodic_def_init(&periodic, sizeof periodic);
-    tiles(count, &cloth.mesh, x, triangle);
-    for (int r = 0; r < ROWS; r++)
-        left[r] = across * r, right[r] = across * r + across - 1;
-    for (int c = 0; c < 2 * across; c++)
-        top[c] = c;
-    for (int k = 0; k < count; k++)
-        weights[k] = across * (ROWS - 1) + TILE * k + 1;
-    cloth.material = material, cloth.material_count = 4;
-    cloth.terms = terms, cloth.term_count = 2;
-    pin.nodes = top, pin.node_count = 2 * (size_t)across;
-    mass.nodes = weights, mass.node_count = (size_t)count, mass.add = 0.002;
-    periodic.from.nodes = left, periodic.from.node_count = ROWS;
-    periodic.to.nodes = right, periodic.to.node_count = ROWS;
-    cloth.pins = &pin, cloth.pin_count = 1;
-    cloth.masses = &mass, cloth.mass_count = 1;
-    cloth.periodic = &periodic, cloth.periodic_count = 1;
-    def.cloths = &cloth, def.cloth_count = 1;
-    def.integrator = (drape_entry_def){"static", settings, 1};
-    def.duration = 1;
-    const drape_status status = drape_model_create(s.ctx, &def, &s.model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
-    scene_start(&s, NULL);
-    return s;
-}
-
-/* The deflections of one tile and of three agree to what is left of the residual, 1e-12 N, over the least
- * stiffness, of some N/m; it has seams all along, where the weight bends it most. */
-START_TEST(a_seam_bends_as_the_rest)
-{
-    static const char *const bending[] = {"bend.hinge", "bend.midedge"};
-    for (int k = 0; k < 2; k++) {
-        scene one = cantilever(1, bending[k]), three = cantilever(3, bending[k]);
-        scene_advance(&one, 1), scene_advance(&three, 1);
-        const double *a = scene_state(&one)->x, *b = scene_state(&three)->x;
-        double most = 0, bent = 0;
-        for (int r = 0; r < ROWS; r++)
-            for (int c = 0; c < 3 * TILE + 1; c++)
-                for (int i = 0; i < 3; i++) {
-                    const int cell = c == 3 * TILE ? 2 : c / TILE, own = (TILE + 1) * r + c - TILE * cell;
-                    most = fmax(most, fabs(b[3 * ((3 * TILE + 1) * r + c) + i] - a[3 * own + i] -
-                                           (i == 0 ? 0.05 * TILE * cell : 0)));
-                }
-        const double *edge = a + 3 * (TILE + 1) * (ROWS - 1);
-        for (int c = 0; c < TILE; c++)
-            bent = fmax(bent, fabs(edge[3 * c + 1] - edge[1]));
-        printf("# %s: %.3g m, deflection %.3g m, %.3g m across\n", bending[k], most, edge[1], bent);
-        ck_assert_double_lt(edge[1], -0.005);
-        ck_assert_double_gt(bent, 1e-4);
-        ck_assert_double_le(most, 1e-10);
-        scene_close(&one), scene_close(&three);
-    }
-}
-END_TEST
-
 /* A flat sheet rolled into a closed tube of n sides: every hinge along it has the angle 2 pi/n, so that the
  * curvature is 2 pi over the length everywhere, and E = D/2 of its square and the area. */
 START_TEST(a_closed_tube_is_bent_evenly)
@@ -507,8 +402,8 @@ START_TEST(what_does_not_repeat_is_refused)
 }
 END_TEST
 
-SUITE("periodic", one_cell_moves_as_each_of_three, a_seam_bends_as_the_rest, a_closed_tube_is_bent_evenly,
-      cells_touch_a_plane_alike, loads_are_alike_everywhere, pressure_closes_in_a_tube,
-      sheets_repeat_in_two_directions, the_jacobian_is_that_of_the_shared_forces,
-      derivatives_across_edges_are_exact, periodic_edges_do_no_work, checkpoints_keep_the_period,
-      hosts_keep_the_period, what_does_not_repeat_is_refused)
+SUITE("periodic", one_cell_moves_as_each_of_three, a_closed_tube_is_bent_evenly, cells_touch_a_plane_alike,
+      loads_are_alike_everywhere, pressure_closes_in_a_tube, sheets_repeat_in_two_directions,
+      the_jacobian_is_that_of_the_shared_forces, derivatives_across_edges_are_exact,
+      periodic_edges_do_no_work, checkpoints_keep_the_period, hosts_keep_the_period,
+      what_does_not_repeat_is_refused)

@@ -1,7 +1,7 @@
 /*
  * test_relaxation.c: relax.maxwell: the coefficients of its steps, the relaxed limit, what it dissipates, and
- * that checkpoints and new models carry the branches. Relaxation and creep under fixed steps are references of
- * `drape validate`: stress_relaxation, creep.
+ * that checkpoints and new models carry the branches. Relaxation and creep under fixed steps are references
+ * of `drape validate`: stress_relaxation, creep.
  */
 #include "model/relaxation.h"
 #include "support/resume.h"
