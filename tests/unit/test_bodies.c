@@ -241,7 +241,9 @@ static const double *vtp_points(const frames_folder *f, const char *name, size_t
 {
     size_t size;
     int points, polygons;
-    *data = file_read(frames_path(f, name), &size);
+    char within[80];
+    snprintf(within, sizeof within, "out/%s", name);
+    *data = file_read(frames_path(f, within), &size);
     const char *piece = strstr(*data, "<Piece "), *appended = strstr(*data, "encoding=\"raw\">\n_");
     ck_assert(piece && appended);
     ck_assert_int_eq(sscanf(piece,
