@@ -105,12 +105,10 @@ static int write_scenes(const validate_request *request, const drape_reference *
         for (int i = 0;
              !status && (!only || only == drape_references[r]) && i < drape_references[r]->case_count; i++) {
             const drape_reference *reference = drape_references[r];
-            const double p = reference->parameters[i];
-            const drape_reference_case one = {
-                reference, p, reference->high > 0 ? drape_reference_expected(reference, p) : 0};
+            const double load = reference->high > 0 ? drape_reference_expected(reference, i) : 0;
             char name[128], text[DRAPE_LAB_TEXT];
             drape_file file = {0};
-            drape_reference_text(&one, text);
+            drape_reference_text(reference, i, load, text);
             snprintf(name, sizeof name, SCENE_NAME, reference->entry.name, i);
             status = drape_export_begin(ctx, folder, name, &file);
             if (!status) {

@@ -15,26 +15,17 @@
 
 #define BISECTIONS 9 /* of a threshold: 1/512 of the interval that it is sought in */
 
-/* The value of a case in a table of values, one a case or one for all; NaN: there is none. */
-static double look_up(const drape_reference *reference, const double *values, int count, double parameter)
+double drape_reference_expected(const drape_reference *r, int index)
 {
-    for (int i = 0; values && i < count; i++)
-        if (count == 1 || reference->parameters[i] == parameter)
-            return values[i];
-    return NAN;
+    return r->expected ? r->expected(r->parameters[index]) : r->known[r->known_count > 1 ? index : 0];
 }
 
-double drape_reference_expected(const drape_reference *reference, double parameter)
+int drape_reference_text(const drape_reference *r, int index, double load, char text[DRAPE_LAB_TEXT])
 {
-    return reference->expected ? reference->expected(parameter)
-                               : look_up(reference, reference->known, reference->known_count, parameter);
-}
-
-int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
-{
-    const drape_reference *r = c->reference;
+    const drape_reference_run run = {
+        .reference = r, .index = index, .parameter = r->parameters[index], .load = load};
     const int length =
-        r->scene ? r->scene(c, text) : lab_sheet_text(r->sheet, r->high > 0 ? c->load : c->parameter, text);
+        r->scene ? r->scene(&run, text) : lab_sheet_text(r->sheet, r->high > 0 ? load : run.parameter, text);
     for (char *at = strchr(text, '\''); at; at = strchr(at, '\''))
         *at = '"';
     return length;
@@ -53,7 +44,7 @@ static drape_status measure_at(drape_reference_run *run, double load, double *va
     const drape_reference *reference = run->reference;
     char json[DRAPE_LAB_TEXT];
     drape_scene *scene = NULL;
-    drape_reference_text(&(drape_reference_case){reference, run->parameter, load}, json);
+    drape_reference_text(reference, run->index, load, json);
     drape_status status = drape_scene_parse(run->ctx, json, "reference", &scene);
     if (!status)
         status = drape_scene_compile(scene, &run->model);
@@ -78,11 +69,11 @@ int drape_validate_runs(const drape_reference *reference)
 }
 
 /* Fills all but parameter, obtained, seconds and message, which are given. */
-static void judge(const drape_reference *reference, drape_validation *v)
+static void judge(const drape_reference *reference, int index, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
-    v->expected = drape_reference_expected(reference, v->parameter);
-    v->documented = look_up(reference, reference->documented, reference->case_count, v->parameter);
+    v->expected = drape_reference_expected(reference, index);
+    v->documented = reference->documented ? reference->documented[index] : NAN;
     v->error = v->obtained / (reference->documented ? v->documented : v->expected) - 1;
     v->verdict = *v->message                                 ? DRAPE_OUTCOME_STOPPED
                  : !(fabs(v->error) <= reference->tolerance) ? DRAPE_OUTCOME_FAIL
@@ -95,6 +86,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
 {
     const double start = drape_clock_cpu_seconds();
     drape_reference_run run = {.reference = reference,
+                               .index = index,
                                .ctx = ctx,
                                .arena = drape_arena_of(ctx),
                                .parameter = reference->parameters[index],
@@ -102,7 +94,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
                                .user = user};
     drape_status status = DRAPE_OK;
     *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
-    judge(reference, out);
+    judge(reference, index, out);
     if (reference->high > 0) {
         /* Bisects between a load at which the measure is 0 and one at which it is not. */
         const double about = reference->documented ? out->documented : out->expected;
@@ -122,7 +114,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
         out->obtained = NAN;
         snprintf(out->message, sizeof out->message, "%s", drape_context_message(ctx));
     }
-    judge(reference, out);
+    judge(reference, index, out);
     return status == DRAPE_E_MEMORY ? status : DRAPE_OK;
 }
 
@@ -157,8 +149,7 @@ lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, si
 static void hash_of(const lab_record *record, char digits[17])
 {
     char text[DRAPE_LAB_TEXT];
-    const drape_reference *r = record->reference;
-    drape_reference_text(&(drape_reference_case){r, r->parameters[record->index], 1}, text);
+    drape_reference_text(record->reference, record->index, 1, text);
     lab_digits(drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)), digits);
 }
 
@@ -216,7 +207,7 @@ drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *
                                     .seconds = lab_number(line, "cpu_s")};
             snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
             drape_make_printable(v->message);
-            judge(record->reference, v);
+            judge(record->reference, record->index, v);
             record->done = true;
         }
         json_decref(line);

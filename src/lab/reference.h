@@ -17,14 +17,16 @@ typedef bool drape_validate_cancel(void *user);
 typedef struct drape_reference drape_reference;
 typedef struct lab_sheet lab_sheet;
 
-/* A simulation while a reference is measured in it. */
+/* A case of a reference, and the simulation in which it is measured. */
 typedef struct drape_reference_run {
     const drape_reference *reference;
+    int index;        /* of the case */
+    double parameter; /* of the case */
+    double load;      /* trial value of a threshold; 0 in other references */
     drape_context *ctx;
     drape_arena arena; /* freed after the measurement */
     drape_model *model;
     drape_sim *sim;
-    double parameter;              /* of the case */
     drape_validate_cancel *cancel; /* NULL: never */
     void *user;                    /* of cancel */
 } drape_reference_run;
@@ -36,13 +38,6 @@ typedef enum drape_outcome {
     DRAPE_OUTCOME_DOCUMENTED, /* differs from the reference by the documented model error */
     DRAPE_OUTCOME_STOPPED     /* the simulation failed */
 } drape_outcome;
-
-/* The case and load that a scene is made for. */
-typedef struct drape_reference_case {
-    const drape_reference *reference;
-    double parameter;
-    double load; /* trial value of a threshold; 0 in other references */
-} drape_reference_case;
 
 /* A reference. Its cases differ in one parameter. */
 struct drape_reference {
@@ -58,8 +53,8 @@ struct drape_reference {
     int known_count;                      /* case_count, or 1 */
     const double *documented; /* (case_count) what the model converges to instead; NULL: no model error */
     const lab_sheet *sheet;   /* the scenes of all cases; NULL: `scene` writes them (sheet.h) */
-    /* Writes the text of the scene of a case, in which ' stands for "; returns its length. */
-    int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
+    /* Writes the text of the scene of a case and its load, in which ' stands for "; returns its length. */
+    int (*scene)(const drape_reference_run *c, char text[DRAPE_LAB_TEXT]);
     double constants[4]; /* for `scene` or `measure`, where references differ in them */
     /* What is measured: the state at the end of the scene, or, by `measure`, which advances the sim
      * itself. */
@@ -108,12 +103,12 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
 /* Simulations that a case takes: the search of a threshold takes several. */
 int drape_validate_runs(const drape_reference *reference);
 
-/* What is expected of the case with that parameter. */
-double drape_reference_expected(const drape_reference *reference, double parameter);
+/* What is expected of a case. */
+double drape_reference_expected(const drape_reference *reference, int index);
 
-/* Writes the scene of a case as JSON. Returns its length. A text that does not fit is cut short, which is no
- * JSON any more. */
-int drape_reference_text(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
+/* Writes the scene of a case, with a load if it is a threshold, as JSON. Returns its length. A text that does
+ * not fit is cut short, and is no JSON any more. */
+int drape_reference_text(const drape_reference *reference, int index, double load, char text[DRAPE_LAB_TEXT]);
 
 const char *drape_outcome_name(drape_outcome verdict);
 

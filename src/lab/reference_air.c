@@ -21,7 +21,7 @@ static double terminal_expected(double how)
     return sqrt(2 * 0.1 * 9.81 / (1.225 * coefficient_of(how)));
 }
 
-static int terminal_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int terminal_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const bool edge_on = c->parameter >= FALLS_EDGE_ON;
     return SHEET_TEXT(text, .columns = 5, .rows = 5, .width = 0.2, .height = 0.2,
@@ -68,7 +68,7 @@ DRAPE_REFERENCE(terminal_velocity, .entry.summary = "speed at which a sheet fall
     .columns = 41, .rows = 3, .width = 1, .height = 0.05, .young_modulus = 12 / (0.02 * 0.02 * 0.02),        \
     .thickness = 0.02, .dt = 0.01, .tolerance = 1e-12
 
-static int flutter_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int flutter_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, RIBBON, .areal_density = MASS,
                       .terms =
@@ -135,7 +135,7 @@ static const struct {
     double mass_ratio, weight, seconds;
 } flags[] = {{0.2, 0, 12}, {0.5, 0, 6}, {2.03e-3, 42.4, 20}};
 
-static int flag_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int flag_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const int which = (int)c->parameter;
     const double b = flags[which].mass_ratio;

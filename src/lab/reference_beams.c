@@ -16,7 +16,7 @@
 
 /* At small G the membrane is soft, so that forces are far above the rounding of membrane forces; at large G
  * the sheet is thin, so that its stretch stays below 1e-4. */
-static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int heavy_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const double h = c->parameter > 5 ? 0.004 : 0.02;
     return SHEET_TEXT(text, STRIP(h), .columns = c->parameter > 50 ? 201 : 81, .rows = 4, .height = 0.02,

@@ -24,7 +24,7 @@ DRAPE_REFERENCE(self_buckling, .entry.summary = "G = rho g L^3/B at which an upr
  * nu). */
 
 /* The sag in the plane of the strip is (h/w)^2 times that of a strip bent about its thin side. */
-static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int lateral_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, STRIP(0.001), .columns = 121, .rows = 5, .height = 0.03,
                       .poisson_ratio = c->parameter, .mesh = "'orientation': 'vertical'",
@@ -42,7 +42,7 @@ DRAPE_REFERENCE(
  * is: E I = (8/9) D w, G J = (8/3) D w, and q L^3 = 12.8538 sqrt(E I G J) is 19.79 D w; a plate of the
  * membrane's own 1/3 has E I = (8/9) D w and G J = (4/3) D w. */
 /* The strip runs along -z. load: rho g L^3/D. */
-static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int hinges_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     enum { EDGES = 8, STRIPS = 240 }; /* across and along the strip */
     const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3;
@@ -89,7 +89,7 @@ DRAPE_REFERENCE(lateral_buckling_hinges,
 #define SLIPPED   0.05 /* [m]: an end that slips moves 0.2 m or more */
 
 /* The strip is in contact with the table from the start, so that the push is that of the track. */
-static int pushed_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int pushed_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(
         text, .columns = 3, .rows = 41, .width = 0.05, .height = 1, .mesh = "'orientation': 'vertical'",

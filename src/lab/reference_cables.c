@@ -57,7 +57,7 @@ static double step_size(double mode)
     return 2 * DRAPE_PI / frequency(mode) / STEPS;
 }
 
-static int chain_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int chain_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, CHAIN, .integrator = "'method': 'midpoint'", .dt = step_size(c->parameter),
                       .tolerance = 1e-10, .others = "'controller': {'type': 'fixed'}");

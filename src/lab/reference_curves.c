@@ -79,7 +79,7 @@ DRAPE_REFERENCE(roller_tension, .entry.summary = "force per width of a sheet dra
  * specimen of KES, 20 cm wide and 5 cm long with free sides, feels 1.5 to 2.5 % less (40 x 10 cells). */
 
 /* The lower edge moves about the upper one, so that the yarns between them keep their length at the end. */
-static int sheared(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int sheared(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const double angle = c->parameter * DEGREE;
     return SHEET_TEXT(

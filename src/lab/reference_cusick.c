@@ -26,7 +26,7 @@
 #define RIGIDITY     1.0 /* D [N m] */
 #define DENSITY      0.1 /* [kg/m2]: it bends by some 1e-3 of its thickness */
 
-static int plate_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int plate_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const double nu = c->parameter;
     return SHEET_TEXT(text, OVERHANG, .rows = PLATE_ROWS, .columns = PLATE_SPOKES,
@@ -61,7 +61,7 @@ DRAPE_REFERENCE(cusick_stiff,
     100.0 /* [N/m], a fiftieth of a woven one's: flat triangles bend across edges only as they stretch */
 
 /* The overhang is released horizontally, falls for 1 s and folds. */
-static int drape_scene_of(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int drape_scene_of(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, OVERHANG, .rows = ROWS, .columns = SPOKES,
                       .material = SHEET_FORMAT("'fabric': '%s', 'young_modulus': %g, 'poisson_ratio': 0, "

@@ -27,7 +27,7 @@ static drape_woven tension_of(double place)
  * degrees; the rod's own angle is ROD_CHORD. */
 
 /* constants: whether it is along the weft. */
-static int cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int cantilever(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const drape_fabric *f = &drape_fabrics[(int)c->parameter];
     const bool weft = c->reference->constants[0] > 0;
@@ -61,7 +61,7 @@ DRAPE_REFERENCE(fabric_weft, CANTILEVER, .entry.summary = "angle of the chord of
 #define STRETCH 1.02 /* by the pull */
 
 /* constants: whether it is pulled along the weft, instead of hung along the warp. */
-static int hung_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int hung_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const bool pulled = c->reference->constants[0] > 0;
     const char *warp = pulled ? "[1, 0, 0]" : "[0, 1, 0]";
@@ -166,7 +166,7 @@ static double shear(double place)
     return tension_of(place).shear;
 }
 
-static int shear_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int shear_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, .grid = "square", .columns = 2, .rows = 2, .width = 1, .height = 1,
                       .material = SHEET_FORMAT("'fabric': '%s'", drape_fabrics[(int)c->parameter].name),

@@ -25,7 +25,7 @@ static double slope(double degrees)
     return tan(degrees * DEGREE);
 }
 
-static int slope_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int slope_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const double angle = c->parameter * DEGREE;
     return SHEET_TEXT(text, TABLE, .gravity = {GRAVITY * sin(angle), -GRAVITY * cos(angle), 0},

@@ -16,7 +16,7 @@ static double fallen(double n)
     return GRAVITY * TIME * TIME * (n + 1) / n / 2;
 }
 
-static int fall_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int fall_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, .columns = 4, .rows = 4, .width = 1, .height = 1, .young_modulus = 1e4,
                       .poisson_ratio = 0.3, .thickness = 1e-3, .areal_density = 0.1,

@@ -61,7 +61,7 @@ static double column(double mode)
 }
 
 /* constants: the force at the free end in parts of B/L^2, in the direction of the strip; it stays so. */
-static int column_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int column_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, BEAM, .tolerance = 1e-12, .factor = -c->reference->constants[0] * STRIP_RIGIDITY,
                       .terms = "'stretch.cst', 'bend.midedge', "

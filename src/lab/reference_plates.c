@@ -19,7 +19,7 @@
 #define NAVIER 0.0040623526606737891
 
 /* constants: the number of rows, and whether the edges are clamped. */
-static int plate_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int plate_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     const int rows = (int)c->reference->constants[0];
     const double nu = c->parameter;
@@ -28,7 +28,7 @@ static int plate_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
                       .pins = c->reference->constants[1] > 0 ? EDGES(", 'clamp': true") : EDGES(""));
 }
 
-static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int hinges_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, PLATE_SHEET, .grid = "square", .columns = 49, .rows = 49,
                       .mesh = c->parameter > 0 ? "'diagonals': 'parallel'" : "'diagonals': 'alternating'",

@@ -38,7 +38,7 @@ static double prony(double t)
 #define HELD 0.02
 
 /* Forty steps: the recurrence is exact in any. */
-static int held(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int held(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, PULLED,
                       .terms = "'stretch.cst', {'type': 'relax.maxwell', 'fraction_1': 0.3, 'time_1': 0.1,\n "

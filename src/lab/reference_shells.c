@@ -71,7 +71,7 @@ DRAPE_REFERENCE(cylinder_pull_out, .entry.summary = "displacement at the middle 
 
 /* constants: the thickness [mm] of a roof whose load is sought at a deflection, the parameter; 0: the
  * parameter is the thickness, and the load at the first limit point is sought. */
-static int roof_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+static int roof_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(
         text, SHELL, .columns = 17, .rows = 17,

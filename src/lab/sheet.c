@@ -139,9 +139,7 @@ double lab_mean(const drape_reference_run *run, const double *values, size_t k)
 
 double lab_displacement(const drape_reference_run *run)
 {
-    const double *pair = run->reference->constants;
-    for (int i = 0; run->reference->parameters[i] != run->parameter; i++)
-        pair += 2;
+    const double *pair = run->reference->constants + 2 * run->index;
     const size_t at = 3 * (size_t)pair[0] + (size_t)fabs(pair[1]) - 1;
     const double moved = drape_sim_positions(run->sim)[at] - drape_model_rest_positions(run->model)[at];
     return pair[1] < 0 ? -moved : moved;
