@@ -256,31 +256,27 @@ static drape_status plan(lab *l)
     l->arguments = json_object_get(l->about, "arguments");
     if (!l->cases || !l->arguments)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < l->def->integrator_count; i++) {
+    for (size_t i = 0; i < l->def->integrator_count; i++) {
         const char *name = l->def->integrators[i];
         int k;
-        status = drape_registry_choose(l->ctx, &drape_integrator_registry, "", name, &k);
-        if (!status && drape_integrators[k]->steady_state)
-            status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                                "\"%s\" has no steps in time: %s needs integrators that have them", name,
-                                l->experiment->entry.name);
+        DRAPE_TRY(drape_registry_choose(l->ctx, &drape_integrator_registry, "", name, &k));
+        if (drape_integrators[k]->steady_state)
+            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                              "\"%s\" has no steps in time: %s needs integrators that have them", name,
+                              l->experiment->entry.name);
     }
-    if (!status)
-        status = l->experiment->plan(l);
+    DRAPE_TRY(l->experiment->plan(l));
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
     if (l->experiment->compares_costs)
         json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
-    if (!status)
-        status = lab_check_about(l->ctx, "the plan", l->about);
+    DRAPE_TRY(lab_check_about(l->ctx, "the plan", l->about));
     /* Lines of a scene that was changed since do not belong to this experiment. */
     const json_t *first = json_array_get(l->cases, 0);
-    if (!status)
-        status = lab_identify(
-            l->ctx, &(lab_request){.def = l->def, .identified = json_object_get(first, "settings")}, digits);
-    if (!status && json_object_set_new(l->about, "scene_hash", json_string(digits)))
-        status = drape_fail_memory(l->ctx, sizeof digits);
-    return status;
+    const lab_request request = {.def = l->def, .identified = json_object_get(first, "settings")};
+    DRAPE_TRY(lab_identify(l->ctx, &request, digits));
+    return json_object_set_new(l->about, "scene_hash", json_string(digits))
+               ? drape_fail_memory(l->ctx, sizeof digits)
+               : DRAPE_OK;
 }
 
 /* Refuses settings that no case takes from the scene: a user who sets dt for a tradeoff expects runs at that
@@ -310,21 +306,20 @@ static drape_status check_settings(lab *l)
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
-    drape_status status = DRAPE_OK;
     if (l->experiment->prepare)
-        status = lab_load(l->ctx, &(lab_request){.def = l->def}, NULL);
-    if (!status && l->experiment->check)
-        status = l->experiment->check(l);
-    for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
+        DRAPE_TRY(lab_load(l->ctx, &(lab_request){.def = l->def}, NULL));
+    if (l->experiment->check)
+        DRAPE_TRY(l->experiment->check(l));
+    for (size_t i = 0; i < json_array_size(l->cases); i++) {
         const json_t *one = json_array_get(l->cases, i);
         const char *series = lab_tag_text(one, "series");
         if (strcmp(series, before) != 0) {
             const lab_request request = lab_request_of(l, i);
-            status = lab_load(l->ctx, &request, NULL);
+            DRAPE_TRY(lab_load(l->ctx, &request, NULL));
         }
         before = series;
     }
-    return status;
+    return DRAPE_OK;
 }
 
 static drape_status make_results(lab *l)
@@ -549,16 +544,15 @@ static void end(lab *l)
 static drape_status find(lab *l, const char *name)
 {
     int i;
-    drape_status status = drape_registry_choose(l->ctx, &lab_experiment_registry, "", name, &i);
-    if (!status)
-        l->experiment = lab_experiments[i];
-    if (!status && l->def->budget_seconds > 0 && !l->experiment->partial)
-        status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g: %s needs all of its cases",
-                            l->def->budget_seconds, name);
-    if (!status && l->def->result_count > 0 && !l->experiment->shows_results)
-        status = drape_fail(l->ctx, DRAPE_E_ARGUMENT, "results: the figures of %s show the same ones always",
-                            name);
-    return status;
+    DRAPE_TRY(drape_registry_choose(l->ctx, &lab_experiment_registry, "", name, &i));
+    l->experiment = lab_experiments[i];
+    if (l->def->budget_seconds > 0 && !l->experiment->partial)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "budget_seconds = %g: %s needs all of its cases",
+                          l->def->budget_seconds, name);
+    if (l->def->result_count > 0 && !l->experiment->shows_results)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "results: the figures of %s show the same ones always",
+                          name);
+    return DRAPE_OK;
 }
 
 static drape_status check_def(drape_context *ctx, const drape_lab_def *def)

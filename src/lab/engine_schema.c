@@ -104,35 +104,29 @@ static drape_status check_cases(place *at, const json_t *cases)
 static drape_status check_scenes(place *at, const json_t *scenes)
 {
     json_t *one;
-    drape_status status =
-        json_array_size(scenes) <= MAX_SCENES ? DRAPE_OK : refuse(at, "arguments/scenes", "more than 256");
-    for (size_t i = 0; !status && (one = json_array_get(scenes, i)); i++) {
+    if (json_array_size(scenes) > MAX_SCENES)
+        return refuse(at, "arguments/scenes", "more than 256");
+    for (size_t i = 0; (one = json_array_get(scenes, i)); i++) {
         snprintf(at->pointer, sizeof at->pointer, "/arguments/scenes/%zu", i);
-        status = check_form(at, one, "{s:s, s:F, s:F, s?:[], s?:[]}", "name", "duration_s", "reference_error",
-                            "t_s", "growth");
-        if (!status)
-            status = check_members(at, one, (const char *const[]){"t_s", "growth", NULL});
-        if (!status)
-            status = check_items(at, one, "t_s", false);
-        if (!status)
-            status = check_items(at, one, "growth", false);
+        DRAPE_TRY(check_form(at, one, "{s:s, s:F, s:F, s?:[], s?:[]}", "name", "duration_s",
+                             "reference_error", "t_s", "growth"));
+        DRAPE_TRY(check_members(at, one, (const char *const[]){"t_s", "growth", NULL}));
+        DRAPE_TRY(check_items(at, one, "t_s", false));
+        DRAPE_TRY(check_items(at, one, "growth", false));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 drape_status lab_check_about(drape_context *ctx, const char *file, json_t *about)
 {
     place at = {ctx, file, ""};
     const json_t *arguments = json_object_get(about, "arguments");
-    drape_status status = check_form(&at, about, "{s:s, s:{s?:[], s?:[]}, s:[], s?:[], s?:[]}", "experiment",
-                                     "arguments", "axes", "scenes", "cases", "results", "settings");
-    if (!status)
-        status = check_items(&at, arguments, "axes", true);
-    if (!status)
-        status = check_items(&at, about, "results", true);
-    if (!status)
-        status = check_scenes(&at, json_object_get(arguments, "scenes"));
-    return status ? status : check_cases(&at, json_object_get(about, "cases"));
+    DRAPE_TRY(check_form(&at, about, "{s:s, s:{s?:[], s?:[]}, s:[], s?:[], s?:[]}", "experiment", "arguments",
+                         "axes", "scenes", "cases", "results", "settings"));
+    DRAPE_TRY(check_items(&at, arguments, "axes", true));
+    DRAPE_TRY(check_items(&at, about, "results", true));
+    DRAPE_TRY(check_scenes(&at, json_object_get(arguments, "scenes")));
+    return check_cases(&at, json_object_get(about, "cases"));
 }
 
 drape_status lab_check_line(const lab *l, const char *file, int64_t number, json_t *line,
@@ -150,7 +144,6 @@ drape_status lab_check_line(const lab *l, const char *file, int64_t number, json
     const json_t *one = i < 0 ? NULL : json_array_get(l->cases, (size_t)i);
     if (!json_equal(json_object_get(line, "tags"), json_object_get(one, "tags")))
         return refuse(&at, "", "it has another number, or other tags");
-    drape_status status =
-        check_members(&at, line, (const char *const[]){"tags", "reasons", "positions", NULL});
-    return status ? status : check_items(&at, line, "positions", false);
+    DRAPE_TRY(check_members(&at, line, (const char *const[]){"tags", "reasons", "positions", NULL}));
+    return check_items(&at, line, "positions", false);
 }

@@ -44,11 +44,8 @@ drape_status lab_ivp_open(drape_arena *arena, const char *path, lab_ivp *s)
     json_decref(text);
     if (!s->name)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_model_load(arena->ctx, path, &s->model);
-    if (!status)
-        status = lab_hash_scene(arena->ctx, path, s->model, s->hash);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_model_load(arena->ctx, path, &s->model));
+    DRAPE_TRY(lab_hash_scene(arena->ctx, path, s->model, s->hash));
     s->size = s->model->length;
     for (int32_t i = 0; i < s->model->node_count; i++)
         s->node_mass += s->model->mass[i];

@@ -167,11 +167,10 @@ static drape_status search(problem *p, int32_t wanted)
         p->room = (int32_t)room;
     }
     double *value = drape_arena_take(&p->tangent.arena, (size_t)wanted, sizeof *value);
-    drape_status status = drape_arena_status(&p->tangent.arena);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_arena_status(&p->tangent.arena));
     const lab_known known = {p->count, p->vector, p->product};
-    status = lab_eigen(p->ctx, &op, &known, wanted, &found, value, p->vector + (int64_t)p->count * p->n);
+    drape_status status =
+        lab_eigen(p->ctx, &op, &known, wanted, &found, value, p->vector + (int64_t)p->count * p->n);
     for (int32_t k = 0; !status && k < found; k++) {
         int32_t at = p->count;
         if (!(value[k] > 0))
@@ -410,9 +409,7 @@ static drape_status fill(problem *p, int32_t count, int64_t below, drape_modes *
 static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *def, drape_modes *out)
 {
     int64_t below = 0;
-    drape_status status = lab_tangent_open(sim, def->buckling ? def->load_factor : 1, true, &p->tangent);
-    if (status)
-        return status;
+    DRAPE_TRY(lab_tangent_open(sim, def->buckling ? def->load_factor : 1, true, &p->tangent));
     p->n = p->tangent.pattern->n;
     if (def->count > p->n - 1)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
@@ -432,10 +429,9 @@ static drape_status compute(problem *p, drape_sim *sim, const drape_modes_def *d
     }
     if (!(p->stiffest > 0))
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT, "nothing in this scene has a stiffness");
-    status = p->buckling ? prepare_buckling(p) : factor_below_all(p);
-    if (!status)
-        status = search_all(p, def->count, &below);
-    return status ? status : fill(p, def->count, below, out);
+    DRAPE_TRY(p->buckling ? prepare_buckling(p) : factor_below_all(p));
+    DRAPE_TRY(search_all(p, def->count, &below));
+    return fill(p, def->count, below, out);
 }
 
 void drape_modes_def_init(drape_modes_def *def, size_t struct_size)

@@ -195,9 +195,7 @@ static drape_status examine(follower *p, drape_path_point *point)
 /* Makes the end of the step the state of the sim, and reports it. *ended: the observer wants no more. */
 static drape_status accept(follower *p, drape_path_point point, bool *ended)
 {
-    drape_status status = drape_sim_set_state(p->sim, drape_sim_time(p->sim), p->x, p->still);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_sim_set_state(p->sim, drape_sim_time(p->sim), p->x, p->still));
     const drape_state *now = drape_sim_state(p->sim);
     const drape_point at = {
         .x = now->x, .v = p->still, .internal = now->internal, .t = now->t, .full = p->tangent.full};
@@ -207,7 +205,7 @@ static drape_status accept(follower *p, drape_path_point point, bool *ended)
     p->change_before = p->change;
     p->moved = point.number > 0;
     p->point = point;
-    status = p->def->observer ? p->def->observer(p->def->user, p->sim, &p->point) : DRAPE_OK;
+    drape_status status = p->def->observer ? p->def->observer(p->def->user, p->sim, &p->point) : DRAPE_OK;
     *ended = status > 0;
     return status > 0 ? DRAPE_OK : status;
 }
@@ -231,9 +229,7 @@ static double limit_of(const follower *p)
 /* Tries a step of that length from the last point. */
 static drape_status attempt(follower *p, double length, drape_path_point *point)
 {
-    drape_status status = open_step(p);
-    if (status)
-        return status;
+    DRAPE_TRY(open_step(p));
     /* The prediction of a step of that length: of the factor under load control, else of the arc. It goes
      * on in the direction of the last step; the first one towards `to`. */
     double change = length;
@@ -246,7 +242,7 @@ static drape_status attempt(follower *p, double length, drape_path_point *point)
         p->step[i] = change * p->b[i];
     p->change = p->direction = change;
     memcpy(p->ahead, p->step, p->n * sizeof *p->step);
-    status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
+    drape_status status = correct(p, p->def->load_control ? CONTROL_LOAD : CONTROL_ARC, limit_of(p), point);
     /* A step that has left the direction of its prediction has found another part of the path, such as the
      * one that leads back. */
     if (!status && !p->def->load_control &&
@@ -409,9 +405,7 @@ static drape_status open(follower *p)
         return drape_fail(p->ctx, DRAPE_E_ARGUMENT,
                           "a path of equilibria is followed without contact: leave out colliders and "
                           "self_contact");
-    drape_status status = lab_tangent_open(p->sim, p->def->from, false, &p->tangent);
-    if (status)
-        return status;
+    DRAPE_TRY(lab_tangent_open(p->sim, p->def->from, false, &p->tangent));
     p->n = (size_t)p->tangent.pattern->n;
     p->nodes = 3 * (size_t)m->node_count;
     double **const arrays[] = {&p->force, &p->load, &p->a, &p->b, &p->step, &p->before, &p->ahead, &p->mode};
@@ -454,9 +448,7 @@ void drape_path_def_init(drape_path_def *def, size_t struct_size)
 drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
 {
     drape_path_def def;
-    drape_status status = sim ? drape_sim_guard(sim, "drape_sim_path") : DRAPE_E_ARGUMENT;
-    if (status)
-        return status;
+    DRAPE_TRY(sim ? drape_sim_guard(sim, "drape_sim_path") : DRAPE_E_ARGUMENT);
     drape_path_def_init(&def, sizeof def);
     if (given)
         memcpy(&def, given, given->struct_size < sizeof def ? given->struct_size : sizeof def);
@@ -469,7 +461,7 @@ drape_status drape_sim_path(drape_sim *sim, const drape_path_def *given)
             "drape_sim_path: from and to are finite and differ, step > 0, max_arc >= 0, "
             "max_points >= 1, 0 < tolerance < 1, branch is -1, 0 or 1, and 0 with load_control");
     follower p = {.ctx = sim->ctx, .sim = sim, .def = &def};
-    status = open(&p);
+    drape_status status = open(&p);
     if (!status)
         status = follow(&p);
     lab_tangent_close(&p.tangent);

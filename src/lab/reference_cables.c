@@ -12,13 +12,12 @@ static drape_status measure_sag(drape_reference_run *run, double *value)
 {
     const size_t nodes = (size_t)drape_model_node_count(run->model);
     double *v = drape_arena_take(&run->arena, 3 * nodes, sizeof *v);
-    drape_status status = v ? lab_advance(run) : DRAPE_E_MEMORY;
-    if (!status)
-        status = lab_settle(run, v);
+    DRAPE_TRY(v ? lab_advance(run) : DRAPE_E_MEMORY);
+    DRAPE_TRY(lab_settle(run, v));
     *value = 0;
     for (size_t i = 0; i < nodes; i++)
         *value = fmax(*value, -drape_sim_positions(run->sim)[3 * i + 1]);
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(catenary, .entry.summary = "sag of 1.2 m over a span of 1 m", .unit = "m", DRAPE_CASES(0),

@@ -33,11 +33,10 @@ static double law(double strain)
 static drape_status measure_pull(drape_reference_run *run, double *value)
 {
     double force[3] = {0};
-    drape_status status = lab_advance(run);
-    if (!status)
-        status = lab_pull(run, 0, SIDE, force);
+    DRAPE_TRY(lab_advance(run));
+    DRAPE_TRY(lab_pull(run, 0, SIDE, force));
     *value = force[0] / SIDE;
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(
@@ -97,11 +96,10 @@ static int sheared(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 static drape_status measure_shear(drape_reference_run *run, double *value)
 {
     double force[3] = {0};
-    drape_status status = lab_advance(run);
-    if (!status)
-        status = lab_pull(run, 2, -SIDE, force);
+    DRAPE_TRY(lab_advance(run));
+    DRAPE_TRY(lab_pull(run, 2, -SIDE, force));
     *value = (force[0] + force[2] * tan(run->parameter * DEGREE)) / SIDE;
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(curve_shear, .entry.summary = "force per length of a sheared edge less W tan g",

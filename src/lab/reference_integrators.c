@@ -167,9 +167,9 @@ static double turned(double turns)
 
 static drape_status measure_velocity(drape_reference_run *run, double *value)
 {
-    drape_status status = drape_sim_advance(run->sim, 2 * DRAPE_PI * run->parameter / OMEGA);
+    DRAPE_TRY(drape_sim_advance(run->sim, 2 * DRAPE_PI * run->parameter / OMEGA));
     *value = drape_sim_velocities(run->sim)[3 * 2 + 2] / -SPEED;
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1",

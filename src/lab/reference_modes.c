@@ -85,9 +85,9 @@ static drape_status find_value(const drape_reference_run *run, bool buckling, in
 
 static drape_status measure_column(drape_reference_run *run, double *value)
 {
-    const drape_status status = find_value(run, true, (int)run->parameter, value);
+    DRAPE_TRY(find_value(run, true, (int)run->parameter, value));
     *value *= run->reference->constants[0];
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(euler_column, .entry.summary = "P L^2/B at which a strip clamped at one end buckles",
@@ -99,11 +99,10 @@ DRAPE_REFERENCE(euler_column, .entry.summary = "P L^2/B at which a strip clamped
 /* Above the threshold the lowest eigenvalue is below 0. */
 static drape_status measure_clamped(drape_reference_run *run, double *value)
 {
-    drape_status status = lab_advance(run);
-    if (!status)
-        status = find_value(run, false, 1, value);
+    DRAPE_TRY(lab_advance(run));
+    DRAPE_TRY(find_value(run, false, 1, value));
     *value = -*value;
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(euler_clamped, .entry.summary = "P L^2/B at which a strip clamped at both ends buckles",
@@ -124,13 +123,13 @@ static drape_status measure_bent(drape_reference_run *run, double *value)
     drape_path_def_init(&def, sizeof def);
     def.to = run->parameter;
     def.branch = 1;
-    drape_status status = drape_sim_path(run->sim, &def);
+    DRAPE_TRY(drape_sim_path(run->sim, &def));
     const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);
     *value = 0;
     for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
         if (rest[3 * i] > 1 - 1e-9)
             *value = fmax(*value, fabs(x[3 * i + 1]));
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(bent_column, .entry.summary = "w/L of the end of a strip that has buckled", .unit = "1",

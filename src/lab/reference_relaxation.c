@@ -52,15 +52,12 @@ static int held(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 static drape_status measure_relaxation(drape_reference_run *run, double *value)
 {
     double before[3] = {0}, after[3] = {0};
-    drape_status status = stretch(run, HELD);
-    if (!status)
-        status = lab_pull(run, 0, SIDE, before);
-    if (!status)
-        status = lab_advance(run);
-    if (!status)
-        status = lab_pull(run, 0, SIDE, after);
+    DRAPE_TRY(stretch(run, HELD));
+    DRAPE_TRY(lab_pull(run, 0, SIDE, before));
+    DRAPE_TRY(lab_advance(run));
+    DRAPE_TRY(lab_pull(run, 0, SIDE, after));
     *value = after[0] / before[0];
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(stress_relaxation, .entry.summary = "force of a strip held stretched, over that at once",
@@ -87,12 +84,11 @@ static double compliance(double t)
 static drape_status measure_creep(drape_reference_run *run, double *value)
 {
     double tip[3];
-    drape_status status = stretch(run, STRAIN);
-    if (!status)
-        status = lab_advance(run);
+    DRAPE_TRY(stretch(run, STRAIN));
+    DRAPE_TRY(lab_advance(run));
     lab_tip(run, tip);
     *value = (tip[0] - SIDE) / (STRAIN * SIDE);
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(

@@ -126,9 +126,9 @@ static drape_status roof_measure(drape_reference_run *run, double *value)
     def.max_arc = 5e-4; /* [m]: some 20 points before the limit */
     def.observer = roof_point;
     def.user = &path;
-    const drape_status status = drape_sim_path(run->sim, &def);
+    DRAPE_TRY(drape_sim_path(run->sim, &def));
     *value = path.load;
-    return status;
+    return DRAPE_OK;
 }
 
 DRAPE_REFERENCE(hinged_roof, .entry.summary = "load at a deflection of the middle of a hinged roof",

@@ -51,11 +51,8 @@ static drape_status read_state(lab_tangent *t, bool needs_potential)
     const drape_state *now = drape_sim_state(t->sim);
     const drape_point point = point_at(t, now->x);
     bool changed;
-    drape_status status = drape_system_begin_reading(t->system, now);
-    if (!status)
-        status = drape_system_extend_pattern(t->system, &point, &changed);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_system_begin_reading(t->system, now));
+    DRAPE_TRY(drape_system_extend_pattern(t->system, &point, &changed));
     t->pattern = drape_system_pattern(t->system);
     const size_t count = (size_t)t->pattern->nonzeros, nodes = 3 * (size_t)m->node_count;
     double *force = drape_arena_take(arena, (size_t)t->pattern->n, sizeof *force);
@@ -109,9 +106,7 @@ drape_status lab_tangent_open(drape_sim *sim, double factor, bool needs_potentia
     t->dissipative = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->dissipative);
     t->without = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->without);
     t->potential = drape_arena_take(arena, (size_t)m->term_count, sizeof *t->potential);
-    drape_status status = drape_arena_status(arena);
-    if (status)
-        return status;
+    DRAPE_TRY(drape_arena_status(arena));
     for (int32_t c = 0; c < m->collider_count; c++)
         same[c] = c;
     t->full = drape_sim_state(sim)->t == 0;
@@ -126,17 +121,13 @@ drape_status lab_tangent_open(drape_sim *sim, double factor, bool needs_potentia
     }
     for (int32_t i = 0; i < 3 * m->free_count; i++)
         t->mass[i] = m->mass[m->node_of_free[i / 3]];
-    status = drape_system_create(arena, m, drape_pool_threads(drape_system_pool(sim->system)), &t->system);
-    if (!status && drape_system_contact(sim->system))
-        status = drape_system_add_contact(t->system);
-    if (!status)
-        status = drape_system_continue(t->system, sim->system, same, drape_sim_state(sim)->t);
-    if (!status)
-        drape_system_copy_wind(t->system, sim->system);
-    if (!status)
-        status = read_state(t, needs_potential);
-    if (status)
-        return status;
+    const int threads = drape_pool_threads(drape_system_pool(sim->system));
+    DRAPE_TRY(drape_system_create(arena, m, threads, &t->system));
+    if (drape_system_contact(sim->system))
+        DRAPE_TRY(drape_system_add_contact(t->system));
+    DRAPE_TRY(drape_system_continue(t->system, sim->system, same, drape_sim_state(sim)->t));
+    drape_system_copy_wind(t->system, sim->system);
+    DRAPE_TRY(read_state(t, needs_potential));
     t->solver = drape_linear_best(t->pattern->n);
     return t->solver->create(arena, t->pattern, &t->factors);
 }
