@@ -307,9 +307,8 @@ static drape_status report(lab *l)
         read_sequence(&series[k], k ? &series[k - 1] : NULL, &sequences[k]);
     for (size_t k = 0; k < count; k++)
         report_order(&sequences[k], l->summary);
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; i < sizeof knobs / sizeof *knobs && !status; i++)
-        status = draw(l, sequences, count, knobs[i].knob, knobs[i].label);
+    for (size_t i = 0; i < sizeof knobs / sizeof *knobs; i++)
+        DRAPE_TRY(draw(l, sequences, count, knobs[i].knob, knobs[i].label));
     for (const sequence *s = sequences; s < sequences + count; s++) {
         lab_table_begin(&t, s->series, "%s\tmoved [m]\torder", s->knob);
         for (size_t i = 0; i < s->count; i++)
@@ -317,7 +316,7 @@ static drape_status report(lab *l)
                           s->moved[i], i > 0 ? local_order(s, i) : NAN);
         lab_table_end(&t);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 const lab_experiment_ops lab_experiment_converge = {

@@ -152,15 +152,14 @@ static void indices_of(const space *s, size_t cell, int *indices)
 static drape_status read_space(lab *l, space *s)
 {
     const json_t *axes = json_object_get(l->arguments, "axes");
-    drape_status status = DRAPE_OK;
     *s = (space){.count = (int)json_array_size(axes), .cells = 1};
     if (s->count < 1 || s->count > MAX_AXES)
         return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: a map has 1 to 3 axes");
-    for (int a = 0; !status && a < s->count; a++) {
-        status = read_axis(l, json_string_value(json_array_get(axes, (size_t)a)), &s->axes[a]);
+    for (int a = 0; a < s->count; a++) {
+        DRAPE_TRY(read_axis(l, json_string_value(json_array_get(axes, (size_t)a)), &s->axes[a]));
         s->cells *= (size_t)s->axes[a].count;
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* What the axes of a def must be besides: an axis of an integer value with fractions would be rounded, and
@@ -689,7 +688,6 @@ static drape_status draw_curves(map *m)
 static drape_status draw(lab *l, const space *s, const lab_quantity *quantity)
 {
     const bool single = s->count == 1;
-    drape_status status = DRAPE_OK;
     map m = {.l = l, .s = s, .quantity = quantity};
     m.rows = single ? (int)(l->count / s->cells) : s->axes[1].count;
     const size_t cells = (size_t)s->axes[0].count * (size_t)m.rows;
@@ -697,11 +695,11 @@ static drape_status draw(lab *l, const space *s, const lab_quantity *quantity)
         find_scale(&m);
     if (single && quantity)
         return draw_curves(&m);
-    for (; !status && m.first + cells <= l->count; m.first += cells) {
+    for (; m.first + cells <= l->count; m.first += cells) {
         m.limits = 0;
-        status = draw_map(&m, (int)(m.first % s->cells / cells));
+        DRAPE_TRY(draw_map(&m, (int)(m.first % s->cells / cells)));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* The result that the figures show, by its number in experiment.json. */
@@ -721,13 +719,13 @@ static drape_status verify(lab *l)
 {
     space s;
     const lab_quantity *quantity;
-    drape_status status = read_space(l, &s);
-    for (size_t i = 0; !status && i < json_array_size(json_object_get(l->about, "results")); i++)
-        status = read_result(l, i, &quantity);
-    if (!status && l->count % s.cells != 0)
-        status = drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: %zu cases are no whole map of %zu cells",
-                            l->count, s.cells);
-    for (size_t i = 0; !status && i < l->count; i++) {
+    DRAPE_TRY(read_space(l, &s));
+    for (size_t i = 0; i < json_array_size(json_object_get(l->about, "results")); i++)
+        DRAPE_TRY(read_result(l, i, &quantity));
+    if (l->count % s.cells != 0)
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "experiment.json: %zu cases are no whole map of %zu cells",
+                          l->count, s.cells);
+    for (size_t i = 0; i < l->count; i++) {
         const json_t *one = json_array_get(l->cases, i), *first = json_array_get(l->cases, i - i % s.cells);
         int index[MAX_AXES];
         indices_of(&s, i % s.cells, index);
@@ -739,10 +737,10 @@ static drape_status verify(lab *l)
             there = there && fabs(lab_tag_number(one, x->pointer) - value) <= 1e-9 * size;
         }
         if (!there)
-            status = drape_fail(l->ctx, DRAPE_E_PARSE,
-                                "experiment.json: /cases/%zu is not at its place on the axes", i);
+            return drape_fail(l->ctx, DRAPE_E_PARSE,
+                              "experiment.json: /cases/%zu is not at its place on the axes", i);
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* A summary and the figures. */
@@ -750,8 +748,8 @@ static drape_status report(lab *l)
 {
     space s;
     const lab_quantity *quantity = NULL;
-    drape_status status = read_space(l, &s);
-    for (size_t first = 0; !status && first + s.cells <= l->count; first += s.cells) {
+    DRAPE_TRY(read_space(l, &s));
+    for (size_t first = 0; first + s.cells <= l->count; first += s.cells) {
         int64_t count[VERDICTS] = {0};
         const char *comma = "";
         for (size_t k = 0; k < s.cells; k++)
@@ -764,15 +762,13 @@ static drape_status report(lab *l)
             }
         fprintf(l->summary, "\n");
     }
-    for (size_t i = 0; !status && i <= json_array_size(json_object_get(l->about, "results")); i++) {
+    for (size_t i = 0; i <= json_array_size(json_object_get(l->about, "results")); i++) {
         if (i > 0)
-            status = read_result(l, i - 1, &quantity);
-        if (status)
-            break;
+            DRAPE_TRY(read_result(l, i - 1, &quantity));
         lab_page_heading(l, quantity ? quantity->entry.name : "What happened");
-        status = draw(l, &s, quantity);
+        DRAPE_TRY(draw(l, &s, quantity));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 const lab_experiment_ops lab_experiment_stability = {

@@ -35,22 +35,22 @@ static const lab_grid grid = {.rtols = LAB_LEVELS(rtols),
 
 static drape_status plan(lab *l)
 {
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && drape_integrators[i]; i++)
+    for (int i = 0; drape_integrators[i]; i++)
         if (lab_wants_integrator(l, drape_integrators[i]->entry.name, !drape_integrators[i]->steady_state))
-            status = lab_add_integrator(l, &grid, drape_integrators[i]);
+            DRAPE_TRY(lab_add_integrator(l, &grid, drape_integrators[i]));
     /* They solve the same equations: only the cost differs. */
-    for (int i = 0; !status && drape_linears[i] && l->def->integrator_count == 0; i++) {
+    for (int i = 0; drape_linears[i] && l->def->integrator_count == 0; i++) {
         char series[96];
         snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
-        status = lab_add_point(l, &(lab_point){.series = series,
-                                               .integrator = BASE_METHOD,
-                                               .pointer = "/integrator/dt",
-                                               .level = {BASE_DT, LINEAR_RANK},
-                                               .more = json_pack("{s:s}", "/integrator/linear_solver",
-                                                                 drape_linears[i]->entry.name)});
+        const lab_point point = {
+            .series = series,
+            .integrator = BASE_METHOD,
+            .pointer = "/integrator/dt",
+            .level = {BASE_DT, LINEAR_RANK},
+            .more = json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name)};
+        DRAPE_TRY(lab_add_point(l, &point));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- The reference solution ----
@@ -484,7 +484,6 @@ static drape_status report(lab *l)
         if (!strstr(a.series[i].name, "linear solver"))
             a.series[a.count++] = a.series[i];
     const lab_series *usual = lab_find_series(a.series, a.count, BASE_METHOD);
-    drape_status status = DRAPE_OK;
     report_headline(l, usual);
     /* The series of which too few cases were run; those without any are named among what was left out. */
     bool any = false;
@@ -503,10 +502,10 @@ static drape_status report(lab *l)
             report_cheapest(l, a, usual, best, pow(10, decade));
     }
     report_reference(l);
-    for (size_t i = 0; !status && i < sizeof charts / sizeof *charts; i++)
-        status = lab_draw_series(l, &charts[i], a.series, a.count);
+    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++)
+        DRAPE_TRY(lab_draw_series(l, &charts[i], a.series, a.count));
     write_table(l);
-    return status;
+    return DRAPE_OK;
 }
 
 const lab_experiment_ops lab_experiment_tradeoff = {

@@ -56,7 +56,6 @@ static drape_status add_series(lab *l, const lab_grid *g, const drape_integrator
 drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrator_ops *integrator)
 {
     const bool own = integrator->own_steps;
-    drape_status status = DRAPE_OK;
     /* An integrator with the parameter max_order is run with its order limited to 2 and to 5, unless the def
      * sets the limit: a series each, because a line through points of different limits has no meaning. 0: no
      * limit is set. */
@@ -64,27 +63,28 @@ drape_status lab_add_integrator(lab *l, const lab_grid *g, const drape_integrato
     for (size_t i = 0; i < l->def->setting_count; i++)
         chosen |= strcmp(l->def->settings[i].pointer, "/integrator/max_order") == 0;
     const int limits[2] = {chosen ? 0 : 2, 5};
-    for (size_t k = 0; !status && k < (chosen ? 1 : 2); k++) {
+    for (size_t k = 0; k < (chosen ? 1 : 2); k++) {
         char series[96];
         json_t *settings = json_object();
         snprintf(series, sizeof series, limits[k] ? "%s, order %d" : "%s", integrator->entry.name, limits[k]);
         if (limits[k])
             json_object_set_new(settings, "/integrator/max_order", json_integer(limits[k]));
-        status = add_series(l, g, integrator, series, own ? "/integrator/rtol" : "/integrator/dt", settings);
+        DRAPE_TRY(
+            add_series(l, g, integrator, series, own ? "/integrator/rtol" : "/integrator/dt", settings));
     }
-    if (status || own || (g->only_if_implicit && integrator->stability))
-        return status;
-    for (int c = 0; !status && drape_controllers[c]; c++) {
+    if (own || (g->only_if_implicit && integrator->stability))
+        return DRAPE_OK;
+    for (int c = 0; drape_controllers[c]; c++) {
         const drape_entry *controller = &drape_controllers[c]->entry;
         char series[96];
         if (!lab_has_param(controller, "rtol"))
             continue;
         snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->name);
-        status = add_series(
+        DRAPE_TRY(add_series(
             l, g, integrator, series, "/controller/rtol",
-            json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt", g->first_step));
+            json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt", g->first_step)));
     }
-    return status;
+    return DRAPE_OK;
 }
 
 /* ---- Results ---- */
