@@ -125,7 +125,6 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->near_element = drape_arena_take(
         arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count) + 1,
         sizeof *s->near_element);
-    s->marked_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->marked_node);
     drape_elements_of_create(arena, m->triangle_count, 3, m->triangle, m->node_count, &s->faces_of);
     drape_elements_of_create(arena, m->edge_count, 2, m->edge, m->node_count, &s->edges_of);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
@@ -205,14 +204,6 @@ static bool is_free(const drape_broad_phase *s, int32_t point)
     return point < s->model->node_count && s->model->free_of_node[point] >= 0;
 }
 
-static bool is_marked(const bool *marked, const int32_t *node, int nodes)
-{
-    for (int a = 0; marked && a < nodes; a++)
-        if (marked[node[a]])
-            return true;
-    return !marked;
-}
-
 /* Whether the model ignores a pair. Nodes 0 and 3 are of different pieces, one of which is of cloth. */
 static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
 {
@@ -248,8 +239,7 @@ static void meet_own_face(void *user, int32_t node, int32_t face)
         return;
     q->pair.area = s->node_area[node];
     set_nodes(&q->pair, node, t[0], t[1], t[2]);
-    if (is_marked(q->want->marked, q->pair.node, 4))
-        report(q, node, &s->faces, face);
+    report(q, node, &s->faces, face);
 }
 
 static void meet_own_edge(void *user, int32_t a, int32_t b)
@@ -262,8 +252,7 @@ static void meet_own_edge(void *user, int32_t a, int32_t b)
         return;
     q->pair.area = 0.5 * (s->edge_area[second] + s->edge_area[first]);
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
-    if (is_marked(q->want->marked, q->pair.node, 4))
-        report(q, first, &s->edges, second);
+    report(q, first, &s->edges, second);
 }
 
 static void meet_face(void *user, int32_t corner, int32_t face)
@@ -340,72 +329,19 @@ static void scanned(void *user, int32_t element)
     of->meet(of->query, of->feature, element);
 }
 
-/* The nodes that are scanned: all of the cloth, or those of elements that have a marked node. */
-typedef struct scanned_cloth {
-    const int32_t *node; /* (nodes); NULL: all nodes of the model */
-    int32_t nodes;
-    double edge; /* [m] upper bound of the lengths of edges between them on the path */
-} scanned_cloth;
-
-static double square_of_edge(const drape_model *m, const drape_broad_query *want, int32_t edge)
+/* The length [m] of the longest edge of the cloth on the path. */
+static double longest_edge(const drape_model *m, const drape_broad_query *want)
 {
     const double *const ends[2] = {want->x, want->y};
-    const int32_t *n = m->edge + 2 * (size_t)edge;
     double largest = 0, d[3];
-    for (int end = 0; end < 2 && ends[end]; end++) {
-        vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
-        const double square = vec3_dot(d, d);
-        largest = square > largest ? square : largest;
-    }
-    return largest;
-}
-
-/* All nodes. The balls around clusters are fitted, by which drape_distant_mark passes over most nodes. */
-static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *want)
-{
-    double largest = 0;
-    drape_distant_fit(&s->distant, want->x, want->y);
-    for (int32_t e = 0; e < s->model->edge_count; e++) {
-        const double square = square_of_edge(s->model, want, e);
-        largest = square > largest ? square : largest;
-    }
-    return (scanned_cloth){.nodes = s->model->node_count, .edge = sqrt(largest)};
-}
-
-/* Lists the nodes of some elements that are not listed yet. */
-static void list_nodes(drape_broad_phase *s, const drape_path_bvh *tree, const int32_t *element,
-                       int32_t elements, scanned_cloth *to)
-{
-    for (int32_t i = 0; i < elements; i++) {
-        const int32_t *node = tree->node + (size_t)element[i] * (size_t)tree->nodes;
-        for (int a = 0; a < tree->nodes; a++) {
-            if (!s->near[node[a]])
-                s->marked_node[to->nodes++] = node[a];
-            s->near[node[a]] = true;
-        }
-    }
-}
-
-/* The nodes of elements that have a marked node. One edge of such a face may have no marked node; it is not
- * longer than the other two together. */
-static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query *want)
-{
-    const int32_t *face = s->faces_of.first, *edge = s->edges_of.first;
-    scanned_cloth some = {.node = s->marked_node};
-    double largest = 0;
-    memset(s->near, 0, (size_t)s->model->node_count * sizeof *s->near);
-    for (int32_t i = 0; i < s->model->node_count; i++) {
-        if (!want->marked[i])
-            continue;
-        list_nodes(s, &s->faces, s->faces_of.element + face[i], face[i + 1] - face[i], &some);
-        list_nodes(s, &s->edges, s->edges_of.element + edge[i], edge[i + 1] - edge[i], &some);
-        for (int32_t e = edge[i]; e < edge[i + 1]; e++) {
-            const double square = square_of_edge(s->model, want, s->edges_of.element[e]);
+    for (int32_t e = 0; e < m->edge_count; e++)
+        for (int end = 0; end < 2 && ends[end]; end++) {
+            const int32_t *n = m->edge + 2 * (size_t)e;
+            vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
+            const double square = vec3_dot(d, d);
             largest = square > largest ? square : largest;
         }
-    }
-    some.edge = 2 * sqrt(largest);
-    return some;
+    return sqrt(largest);
 }
 
 /* Whether a node is farther than the reach from a collider on its whole path. Then no element that has the
@@ -463,9 +399,8 @@ static void scan_tree(query *q, const drape_path_bvh *features, int32_t feature,
                                    .nodes = features->nodes,
                                    .x = want->x,
                                    .y = want->y,
-                                   .reach = reach[feature] + want->reach,
-                                   .only_marked = !is_marked(want->marked, node, features->nodes)};
-    drape_path_bvh_scan(tree, &from, among, want->marked, q->broad->side, scanned, &(scan){q, feature, meet});
+                                   .reach = reach[feature] + want->reach};
+    drape_path_bvh_scan(tree, &from, among, q->broad->side, scanned, &(scan){q, feature, meet});
 }
 
 /* Finds the pairs with features of colliders that have no triangles, by a scan of the cloth near each
@@ -474,35 +409,33 @@ static void scan_features(query *q)
 {
     drape_broad_phase *s = q->broad;
     const drape_model *m = s->model;
-    const bool *marked = q->want->marked;
-    scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* -1: not listed yet */
+    const drape_broad_query *want = q->want;
+    double edge = -1; /* the longest one; -1: not measured yet */
     int32_t segment = 0;
-    set_reaches(s, q->want->passing);
+    set_reaches(s, want->passing);
     for (int32_t k = 0; k < m->collider_count; k++) {
         const drape_collider_shape *shape = &m->colliders[k].shape;
         const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;
         if (shape->point_count == 0)
             continue;
-        const bool only_marked = marked && !marked[s->first_point[k]];
-        scanned_cloth *of = only_marked ? &some : &all;
-        if (of->edge < 0)
-            *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
+        if (edge < 0) {
+            edge = longest_edge(m, want);
+            drape_distant_fit(&s->distant, want->x, want->y);
+        }
         /* Marks and lists the nodes that are near or close. If the collider turns, these are all: its
          * features move straight in space, which is not straight in its coordinates. */
-        const drape_broad_query *want = q->want;
         const drape_collider_pose *const pose[2] = {&want->pose[0][k], &want->pose[want->y ? 1 : 0][k]};
         const bool turns = (pose[0]->turned || pose[1]->turned) &&
                            memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
-        const double gap = feature_reach(s, k, want->passing) + want->reach, reach = gap + of->edge,
-                     close = gap_of_nodes(s->model->colliders[k].shape.radius, gap, of->edge);
+        const double gap = feature_reach(s, k, want->passing) + want->reach, reach = gap + edge,
+                     close = gap_of_nodes(shape->radius, gap, edge);
         int32_t points = 0;
-        if (of->node || turns)
-            memset(s->near, of->node ? 0 : 1, (size_t)s->model->node_count * sizeof *s->near);
+        if (turns)
+            memset(s->near, 1, (size_t)m->node_count * sizeof *s->near);
         else
             drape_distant_mark(&s->distant, k, pose, reach, s->near);
-        for (int32_t i = 0; i < of->nodes; i++) {
-            const int32_t node = of->node ? of->node[i] : i;
-            if (!of->node && !s->near[node])
+        for (int32_t node = 0; node < m->node_count; node++) {
+            if (!s->near[node])
                 continue;
             s->near[node] = turns || !is_distant(s, want, k, node, reach);
             s->close[node] = turns || (s->near[node] && !is_distant(s, want, k, node, close));
@@ -534,8 +467,7 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
             .y = want->y,
             .reach = drape_broad_phase_wanted(s, want->passing, distance) + want->reach,
             .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
-            .rounding = s->rounding,
-            .marked = want->marked};
+            .rounding = s->rounding};
         self_query both = {q, q};
         begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
         begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
@@ -557,7 +489,7 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
               {&s->obstacles, s->obstacle_reach}};
     set_reaches(s, want->passing);
     for (size_t i = 0; i < sizeof of / sizeof *of; i++)
-        drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
+        drape_path_bvh_fit(of[i].tree, want->x, want->y, of[i].reach);
     begin_stage(&q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
     drape_path_bvh_join(&s->corners, &s->faces, q.want->y, q.want->reach, meet_face, &q);
     begin_stage(&q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);

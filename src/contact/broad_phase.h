@@ -35,7 +35,6 @@ typedef struct drape_broad_phase {
     bool *near, *close;    /* (node_count) scratch: an element can meet a feature of a collider if all
                                              of its nodes are near and one is close */
     int32_t *near_node, *near_element;    /* (node_count), (edges or triangles) scratch: lists of these */
-    int32_t *marked_node;                 /* (node_count) scratch: the nodes of marked elements */
     drape_elements_of faces_of, edges_of; /* of each node, by feature scans */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
@@ -53,7 +52,6 @@ typedef struct drape_broad_query {
     const drape_collider_pose *pose[2]; /* (collider_count) at x, and at y */
     double reach;
     bool passing;
-    const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
 /* Calls visit for every such pair, in an order that does not depend on the positions; the order by rank does
