@@ -92,6 +92,7 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
         c->before = drape_arena_take(arena, nodes, sizeof *c->before);
         c->moved = drape_arena_take(arena, nodes, sizeof *c->moved);
+        c->slid = drape_arena_take(arena, nodes, sizeof *c->slid);
         c->carried = drape_arena_take(arena, nodes, sizeof *c->carried);
         c->deformed = drape_arena_take(arena, colliders, sizeof *c->deformed);
         c->body = drape_arena_take(arena, colliders, sizeof *c->body);

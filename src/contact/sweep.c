@@ -260,7 +260,7 @@ static bool sweep_meshes(drape_contact *c, double *y)
 
 static void sweep_all(drape_contact *c, double *y)
 {
-    uint8_t *slid = c->broad.side;
+    uint8_t *slid = c->slid;
     bool moved = true;
     memset(slid, 0, (size_t)c->model->node_count * sizeof *slid);
     drape_distant_fit(&c->broad.distant, c->start, y);

@@ -188,37 +188,6 @@ void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *fro
         traverse_points(bvh, &around, visit, user);
 }
 
-/* ---- Without a tree ---- */
-
-/* An axis separates an element if all of its points are on the same side. */
-void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from,
-                         const drape_path_elements *among, uint8_t *side, drape_bvh_visit *visit, void *user)
-{
-    /* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
-    const double *const x = from->x, *const y = from->y ? from->y : from->x;
-    const drape_box first = box_of(from->node, from->nodes, x), last = box_of(from->node, from->nodes, y);
-    for (int32_t p = 0; p < among->points; p++) {
-        const size_t i = (size_t)among->point[p];
-        unsigned int sides = 0;
-        for (size_t k = 0; k < 3; k++) {
-            const unsigned int above = (unsigned int)(x[3 * i + k] > first.high[k] + from->reach) &
-                                       (unsigned int)(y[3 * i + k] > last.high[k] + from->reach),
-                               below = (unsigned int)(x[3 * i + k] < first.low[k] - from->reach) &
-                                       (unsigned int)(y[3 * i + k] < last.low[k] - from->reach);
-            sides |= (above | below << 1) << 2 * k;
-        }
-        side[i] = (uint8_t)sides;
-    }
-    for (int32_t i = 0; i < among->elements; i++) {
-        const int32_t e = among->element[i], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
-        unsigned int common = side[node[0]];
-        for (int a = 1; a < bvh->nodes; a++)
-            common &= side[node[a]];
-        if (common == 0)
-            visit(user, e);
-    }
-}
-
 /* ---- Two trees ---- */
 
 /* A test that is to be made: of one child, or of all children, of a branch of one tree, against all children

@@ -90,17 +90,6 @@ typedef struct drape_path_query {
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
-/* Some elements of a tree, and the points of these elements. */
-typedef struct drape_path_elements {
-    const int32_t *element, *point;
-    int32_t elements, points;
-} drape_path_elements;
-
-/* The same for some elements of a tree that is not fitted, by a test of each of their points: for a few
- * queries this costs less than to fit the tree. side: (largest point + 1) scratch. */
-void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query,
-                         const drape_path_elements *among, uint8_t *side, drape_bvh_visit *visit, void *user);
-
 /* Calls visit for every pair of elements, one of each tree, that no axis separates by more than reach at both
  * ends; both trees were fitted to the same ends. Branches that are apart are met once for all of their
  * elements, so this takes a fraction of the time of a query for each element. The order does not depend on

@@ -6,7 +6,7 @@
 #include "io/export.h"
 #include "io/json.h"
 #include "model/model.h"
-#include "realtime/report.h"
+#include "realtime/relaxed_report.h"
 #include "sim/inside.h"
 #include "sim/sim.h"
 #include "sim/warnings.h"

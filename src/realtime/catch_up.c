@@ -11,8 +11,8 @@
 
 #define HURRY 1.5
 
-/* Whether all nodes, displaced so, stay apart from a collider that is not sent with them: a distance changes
- * by no more than the path. */
+/* Whether all nodes stay apart from a collider that is not sent with them when they are displaced by a path:
+ * a distance changes by no more than the length of the path. */
 static bool stays_apart(const drape_sim *sim, int32_t collider, const double path[3])
 {
     const drape_model *m = sim->model;
@@ -58,7 +58,7 @@ drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rat
     drape_sent_part part = {.t = now->t, .end = now->t + owed};
     double ahead[3] = {0};
     *rates = (drape_catch_up){drape_motion_sends(motion, part.t, part.end), 1, 1};
-    if (!rates->sent) /* what moves, moves in simulated time */
+    if (!rates->sent) /* then all motion is in simulated time */
         m->behind = m->pins_behind = 0;
     if (!(m->behind > 0 || m->pins_behind > 0))
         return DRAPE_OK;
@@ -66,7 +66,8 @@ drape_status drape_sim_catch_up(drape_sim *sim, double owed, drape_catch_up *rat
     bool goes = drape_motion_sends_pins(motion, part.t, part.end) &&
                 drape_motion_moves_as_one(motion, 0, sim->model->node_count, now->x, part.end, part.common);
     vec3_add_scaled(dropped, part.common, ahead);
-    /* The cloth can go ahead by that, with the colliders that are sent, if it stays apart from the others. */
+    /* The cloth and the colliders that are sent go ahead if the cloth stays apart from the other
+     * colliders. */
     for (int32_t c = 0; c < sim->model->collider_count && goes; c++)
         goes = drape_motion_sends_collider(motion, c, part.t, part.end) || stays_apart(sim, c, ahead);
     for (int k = 0; k < 3; k++) {

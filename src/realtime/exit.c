@@ -8,14 +8,14 @@
 
 #include <string.h>
 
-#define MARGIN   DRAPE_BARRIER_PARABOLA /* of the activation distance, by which a path ends outside */
-#define FLAT     0.5 /* share of the normals of a patch that is left in their sum: below it is curled up */
-#define KEPT     0.3 /* cosine to the cloth: a direction more along the cloth than this is found anew */
-#define MARCHES  64  /* along a path out */
-#define FARTHEST 2   /* path out, in lengths of the body: longer ones are cut */
-#define SAMPLES  4
+#define MARGIN   DRAPE_BARRIER_PARABOLA /* gap at the end of a path out, in activation distances */
+#define FLAT     0.5 /* a patch is curled up if the sum of its normals is less than this share of its area */
+#define KEPT     0.3 /* cosine of direction and normal: a direction more along the cloth is found anew */
+#define MARCHES  64  /* advances along a path out */
+#define FARTHEST 2   /* longest path out, in lengths of the body */
+#define SAMPLES  4   /* points of a face that are tested */
 
-/* ---- Which faces ---- */
+/* ---- Faces that a collider pierces ---- */
 
 /* Where the segment p q meets the plane of a triangle whose sides it passes through. */
 static void find_piercing(const double *p, const double *q, const double *const x[3], double out[3])
@@ -36,9 +36,9 @@ typedef struct crossing {
     const drape_contact *contact;
     int32_t collider;
     const double *x[3]; /* [m] corners of the face */
-    double *where;      /* [m] as the function below returns it; NULL: not asked for */
-    int64_t key; /* of the triangle that was found: its index, and INT32_MAX more if it has no segment that
-                           passes through the face */
+    double *where;      /* [m] the piercing of drape_exit_is_pierced; may be NULL */
+    int64_t key; /* of the triangle that was found: its index, plus INT32_MAX if none of its segments passes
+                           through the face */
     bool found;
 } crossing;
 
@@ -65,8 +65,8 @@ static bool cross_triangle(const crossing *q, const int32_t point[3])
     return found;
 }
 
-/* The segments of a shape with triangles are their edges. Of several triangles the one with the least key
- * counts, in whatever order the tree has them. */
+/* The segments of a shape with triangles are their edges. Of several triangles the one with the smallest key
+ * counts, whatever their order in the tree is. */
 static void meet_triangle(void *user, int32_t triangle)
 {
     crossing *q = user;
@@ -113,7 +113,8 @@ bool drape_exit_is_pierced(const drape_contact *c, int32_t collider, int32_t fac
     return q.found;
 }
 
-/* Points at which a face is looked at: its middle and those of its sides, or where it is pierced. */
+/* The points of a face that are in a collider, among its middle, those of its sides, and where it is pierced.
+ * Returns their number. */
 static int sample(const drape_contact *c, int32_t collider, int32_t face, bool *pierced, double x[][3])
 {
     static const double share[SAMPLES][3] = {
@@ -131,7 +132,7 @@ static int sample(const drape_contact *c, int32_t collider, int32_t face, bool *
     return count;
 }
 
-/* Some node of the face is relaxed, and none is blocked. */
+/* Whether some node of a face is relaxed, and none is blocked or pinned. */
 static bool may_come_out(const drape_contact *c, int32_t collider, int32_t face)
 {
     const int32_t *n = c->model->triangle + 3 * (size_t)face;
@@ -167,7 +168,7 @@ static void smooth_normal(const drape_relaxed_patch *p, const double own[3], dou
         out[k] = length > FLAT * p->area ? p->normal[k] / length : own[k];
 }
 
-/* How long a body is, about; 0: it has no end. */
+/* A length of a body, about its extent; 0: the body has no end. */
 static double length_of(const drape_collider_shape *shape)
 {
     double length = 0, to[3];
@@ -178,8 +179,8 @@ static double length_of(const drape_collider_shape *shape)
     return length;
 }
 
-/* How far it is from a point out of a collider in some direction; the longest path where another collider is
- * at the end. */
+/* The length of the path out of a collider from a point in some direction; that of the longest path allowed
+ * if another collider is at the end. */
 static double path_out(const drape_contact *c, int32_t collider, const double from[3], const double along[3])
 {
     const double margin = MARGIN * c->broad.distance[collider],
@@ -204,9 +205,10 @@ static double path_out(const drape_contact *c, int32_t collider, const double fr
 typedef struct search {
     drape_contact *c;
     int32_t collider;
-    uint8_t *face;   /* (triangle_count) what there is: 0 nothing, INSIDE, PIERCED; then, of those that need
-                        it, whether they go along their normal or against it */
-    int32_t *parent; /* (node_count) */
+    uint8_t
+        *face; /* (triangle_count) 0: not in a patch; INSIDE, PIERCED; after `choose` whether the patch goes
+                        along the normal of the face or against it */
+    int32_t *parent;              /* (node_count) */
     drape_relaxed_patch *patches; /* (node_count) */
 } search;
 
@@ -252,8 +254,8 @@ static void gather(search *s)
     }
 }
 
-/* Of bodies that their core and its radius describe, the nearest surface leads out unless the core passes
- * through the cloth. */
+/* Marks the faces that may need a direction; returns whether there are any. The nearest surface leads out of
+ * a body that is not solid (relaxed.h), unless a segment of it passes through the face. */
 static bool mark(search *s)
 {
     const drape_model *m = s->c->model;
@@ -290,7 +292,7 @@ static void add_costs(search *s)
     }
 }
 
-/* Whether the nearest surface to some point of a face is on the other side of the cloth. */
+/* Whether the nearest surface to some point of a face in the collider leads away from the direction `to`. */
 static bool is_astray(const search *s, int32_t face, const double to[3])
 {
     double x[SAMPLES + 1][3], n[3];
@@ -302,7 +304,8 @@ static bool is_astray(const search *s, int32_t face, const double to[3])
     return astray || pierced;
 }
 
-/* Leaves those faces marked that the nearest surface does not lead out. */
+/* Chooses the side to which each patch goes, and leaves only those faces marked that the nearest surface does
+ * not lead out there. */
 static bool choose(search *s)
 {
     bool any = false;
@@ -350,7 +353,8 @@ static void find_ends(search *s)
     }
 }
 
-static drape_status send(search *s, int32_t node, const drape_relaxed_patch *p, double t)
+/* Sets direction and end of the path of a node of a patch, in the coordinates of the collider. */
+static drape_status set_exit(search *s, int32_t node, const drape_relaxed_patch *p, double t)
 {
     const drape_collider_pose *pose = &s->c->pose[s->collider];
     double to[3], end[3], origin[3] = {0};
@@ -406,7 +410,7 @@ drape_status drape_exit_find(drape_contact *c, double t)
                 drape_relaxed_of(c)->nodes[i].exits = false;
         for (int32_t f = 0; !status && f < m->triangle_count; f++)
             for (size_t a = 0; s.face[f] && !status && a < 3; a++)
-                status = send(&s, m->triangle[3 * (size_t)f + a], patch_of(&s, f), t);
+                status = set_exit(&s, m->triangle[3 * (size_t)f + a], patch_of(&s, f), t);
     }
     return status;
 }

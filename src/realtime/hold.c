@@ -15,8 +15,8 @@
 #define MOST_IN_A_ROW  10
 #define MOST_IN_A_STEP 24
 
-/* Free nodes go where the pins of their cloth go as one: otherwise these would be torn from them, and pass
- * through the cloth beside them. */
+/* Moves the free nodes of a cloth along if its pins all have the same displacement: otherwise pins would be
+ * torn from them, and pass through the cloth beside them. */
 static void carry(const drape_motion *motion, const drape_state *now, drape_state *next)
 {
     const drape_model *m = motion->model;
@@ -37,13 +37,13 @@ static void carry(const drape_motion *motion, const drape_state *now, drape_stat
     }
 }
 
-/* Pins and colliders do all the work: the free nodes go along, and with them inertia and damping. */
+/* The energy to which pins and colliders, which do all the work in a held step, add. */
 static double potential(const drape_energy *e)
 {
     return e->elastic + e->gravity + e->contact;
 }
 
-/* A status > 0: this is not possible either. Errors: DRAPE_E_MEMORY. */
+/* Makes the held step; a status > 0: it is not possible. Errors: DRAPE_E_MEMORY. */
 static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info *info)
 {
     const drape_state *now = drape_sim_state(sim);

@@ -15,7 +15,7 @@
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "realtime/catch_up.h"
-#include "realtime/report.h"
+#include "realtime/relaxed_report.h"
 #include "sim/untangle.h"
 
 #include <math.h>

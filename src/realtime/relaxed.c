@@ -9,7 +9,8 @@
 
 #define DOUBLED 0.02 /* [s] in which the pressure on a node that has room doubles, and falls by half */
 
-/* A shape without points may have no end, as a plane; inscribed ones are inside of it. */
+/* A ball around a shape: centre and radius, which is INFINITY if the shape may have no end, as a plane, or if
+ * its points are inside of its surface. */
 static void bound_of(const drape_collider_shape *shape, double out[4])
 {
     double radius = shape->point_count > 0 && !shape->inscribed ? 0 : INFINITY, to[3];
@@ -77,7 +78,7 @@ static double factor_of(const drape_relaxed_set *set, int32_t collider, const in
     return factor;
 }
 
-/* ---- What contact asks ---- */
+/* ---- The functions of exempt.h ---- */
 
 static bool has(const drape_exempt *exempt, int32_t collider, const int32_t *node, int nodes)
 {
@@ -106,8 +107,8 @@ static double factor(const drape_exempt *exempt, const drape_pair *pair)
     return largest;
 }
 
-/* Features of parts that enclose a volume do not know on which side the cloth belongs, and nodes that come
- * out along a direction of their own are not pushed along another one. */
+/* Features of solid colliders do not act, since cloth may be on their wrong side, and neither do pairs of a
+ * node that is pushed out along the direction of its patch. */
 static bool acts(const drape_exempt *exempt, const drape_pair *pair)
 {
     const drape_relaxed_set *set = (const drape_relaxed_set *)exempt;
@@ -147,8 +148,8 @@ drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *conta
     for (size_t i = 0; !drape_arena_status(arena) && i < colliders; i++) {
         bound_of(&model->colliders[i].shape, set->bound + 4 * i);
         set->bound_t[i] = NAN;
-        /* Parts without a radius, triangles of a mesh, or parts that enclose more than what is within
-         * their radius: the middle is deeper. */
+        /* Solid are shapes of points and segments without a radius, meshes, and shapes whose middle is deeper
+         * than their radius, since they enclose more than what is within the radius of their features. */
         const drape_collider_shape *shape = &model->colliders[i].shape;
         set->solid[i] = shape->point_count > 0 &&
                         (!(shape->radius > 0) || !model->colliders[i].ops->smooth ||

@@ -1,9 +1,9 @@
 /*
- * relaxed.h: the cloth that bodies leave no room: nodes, each with the collider whose surface does not
- * hold it for the time being. A pair is relaxed if one of its nodes of cloth is, for its collider. Relaxed
- * pairs have the bounded barrier (barrier.h), which pushes out with a pressure of no more than the
- * scene's, and are not checked. A node that has room again is pushed more and more, until its gap is as
- * large as contact allows.
+ * relaxed.h: the cloth that bodies leave no room: relaxed nodes, each with the collider whose surface does
+ * not hold it for the time being. A pair is relaxed if one of its nodes of cloth is relaxed for its collider.
+ * Relaxed pairs are exempt (contact/exempt.h): the bounded barrier pushes them out with no more than the
+ * scene's pressure, and they are not checked. A node that has room again is pushed more and more, until its
+ * gap is as large as contact allows.
  */
 #ifndef DRAPE_REALTIME_RELAXED_H
 #define DRAPE_REALTIME_RELAXED_H
@@ -14,18 +14,18 @@
 typedef struct drape_relaxed_node {
     int32_t collider; /* -1: pinned pieces of cloth */
     int32_t node;
-    double since;           /* [s] */
-    double until;           /* [s] it is not held again before this time */
-    double depth, deepest;  /* [m] at the beginning of the last step, >= 0; since it was relaxed */
-    double gap;             /* [m] the smallest of its pairs there, INFINITY: none is active */
-    double factor;          /* of the pressure, >= 1 */
-    bool blocked;           /* there was no room for it at the end of the last step that was looked at */
-    bool fresh;             /* no step was accepted since it was relaxed */
-    bool exits;             /* it is in a patch that comes out along one direction (exit.h): */
+    double since;          /* [s] */
+    double until;          /* [s] it is not held again before this time */
+    double depth, deepest; /* [m] >= 0, at the beginning of the last step; the largest since it was relaxed */
+    double gap;            /* [m] smallest gap of its pairs at that time; INFINITY: none is active */
+    double factor;         /* of the pressure, >= 1 */
+    bool blocked;          /* it had no room at the end of the last step that was tested */
+    bool fresh;            /* no step was accepted since it was relaxed */
+    bool exits;            /* it is in a patch that comes out along one direction (exit.h): */
     double exit[3], height; /* in the coordinates of the collider: the direction, and its end along it [m] */
 } drape_relaxed_node;
 
-/* Where it is blocked, the direction waits. */
+/* Whether a node is pushed along the direction of its patch: not while it is blocked. */
 static inline bool drape_relaxed_goes_out(const drape_relaxed_node *node)
 {
     return node->exits && !node->blocked;
@@ -61,26 +61,26 @@ typedef struct drape_relaxed_set {
     drape_relaxed_patch *patches; /* (node_count) and this */
     double *bound;   /* (collider_count x 4) centre at rest and radius around a collider, INFINITY: none; */
     double *bound_t; /* (collider_count) [s] of those that deform. Not archived: they follow the bodies */
-    bool *solid; /* (collider_count) its parts enclose a volume: inside, they push to whichever side the cloth
-                    is on, and only the distance from the whole tells where out is */
+    bool *solid; /* (collider_count) its features enclose a volume. Inside of it they would push cloth to the
+                    side that it is on; only the distance from the whole collider leads out */
     drape_relaxed_total *total; /* (collider_count + 1) the last one: of pinned pieces of cloth */
     double t;                   /* [s] of the last update */
     double ahead_t; /* [s] the end of the step that begins next; NAN: unknown. Set before each step */
-    bool may_relax; /* cloth without room there may be relaxed; set with it */
+    bool may_relax; /* set with ahead_t: cloth without room at that time may be relaxed */
     bool *logged;   /* (collider_count + 1) the last message was that cloth is relaxed there */
-    bool counting;  /* nodes that would be relaxed are counted, and nothing changes; during one search */
+    bool counting; /* during drape_room_lacks: nodes that would be relaxed are counted, and nothing changes */
 } drape_relaxed_set;
 
 /* In an arena; what grows later is in that of contact. Errors: DRAPE_E_MEMORY. */
 drape_status drape_relaxed_create(drape_arena *arena, const drape_contact *contact, drape_relaxed_set **out);
 
-/* The set that contact asks. */
+/* The set of a contact for which drape_room_open was called. */
 static inline drape_relaxed_set *drape_relaxed_of(const drape_contact *contact)
 {
     return (drape_relaxed_set *)contact->exempt;
 }
 
-/* The ball around a collider as contact has fitted it. */
+/* The ball around a collider in its present shape: centre and radius. */
 const double *drape_relaxed_bound_of(const drape_contact *contact, int32_t collider);
 
 /* The distance [m] of a point from a collider, where contact is evaluated. normal (3) may be NULL. */
@@ -90,27 +90,28 @@ double drape_relaxed_distance(const drape_contact *contact, int32_t collider, co
 /* NULL: the node is held. */
 drape_relaxed_node *drape_relaxed_find(const drape_relaxed_set *set, int32_t collider, int32_t node);
 
-/* Relaxes a node from time t on, at least until `until`, or says that a relaxed one has no room. *added is
- * raised by 1 if it was not relaxed. Errors: DRAPE_E_MEMORY. */
+/* Relaxes a node from time t on, at least until `until`, and notes that it is blocked. *added is raised by 1
+ * if the node was not relaxed. Errors: DRAPE_E_MEMORY. */
 drape_status drape_relaxed_add(drape_relaxed_set *set, int32_t collider, int32_t node, double t, double until,
                                int32_t *added);
 
-/* Time has come to t since the last update, in which nodes had the depths of now: pushes those with room more
- * and the others less, up to max_factor, and adds to the totals. Nothing if t is that of the last update. */
+/* Takes account of the time from the last update to t: raises the pressure on nodes with room, up to
+ * max_factor, lowers it on the others, and adds to the totals. Nothing if t is the time of the last
+ * update. */
 void drape_relaxed_update(drape_relaxed_set *set, double t, double max_factor);
 
 /* The number of nodes that are relaxed for a collider. */
 int32_t drape_relaxed_count(const drape_relaxed_set *set, int32_t collider);
 
-/* [s] When the first of these was relaxed; INFINITY: there are none. */
+/* When the first of these nodes was relaxed [s]; INFINITY: there are none. */
 double drape_relaxed_since(const drape_relaxed_set *set, int32_t collider);
 
 /* Removes the nodes for which `leaves` is true. Returns their number. */
 typedef bool drape_relaxed_leaves(void *user, const drape_relaxed_node *node);
 int32_t drape_relaxed_remove(drape_relaxed_set *set, drape_relaxed_leaves *leaves, void *user);
 
-/* Takes what is relaxed, and what became of the cloth so far, from a set of the same cloth. before
- * (collider_count): the number that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
+/* Copies the relaxed nodes and the totals from a set of the same cloth. before (collider_count): the number
+ * that each collider has there; -1: it is new. Errors: DRAPE_E_MEMORY. */
 drape_status drape_relaxed_continue(drape_relaxed_set *to, const drape_relaxed_set *from,
                                     const int32_t *before);
 

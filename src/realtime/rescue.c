@@ -1,23 +1,24 @@
 /*
- * rescue.c: what becomes of a step that fails (sim/rescue.h). Cloth that bodies leave no room is relaxed
- * (room.h), with no_room "relax" or, by default, with a time budget, and the same step made again. With a
- * budget, cloth is held in the end (hold.h).
+ * rescue.c: what happens after a step that fails (sim/rescue.h). With no_room "relax" or, by default, with a
+ * time budget, cloth that bodies leave no room is relaxed (room.h), and the same step is made again. With a
+ * time budget, cloth is held in the end (hold.h).
  */
 #include "base/clock.h"
 #include "base/reason.h"
 #include "realtime/hold.h"
-#include "realtime/report.h"
+#include "realtime/relaxed_report.h"
 #include "realtime/room.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-/* Attempts that fail in a row, or halvings of a step, after which the pairs that hold it up are relaxed:
- * impacts on cloth that has room take some. With a time budget, where each attempt may be that of a frame,
- * also attempts that fail before a whole nominal step is made, whatever was accepted between them: then it is
- * only the pair that refuses the next one. With 3 instead of 6, three capes with self-contact were 23 mm
- * inside of bodies, instead of nowhere, and pinches dropped a tenth less time. */
+/* After so many attempts that fail in a row, or so many halvings of a step, the pairs that hold the step up
+ * are relaxed; an impact on cloth that has room also takes some attempts. With a time budget, where a frame
+ * may have one attempt, after so many attempts that fail before a whole nominal step is made, whatever was
+ * accepted between them, the pair that refuses the next attempt is relaxed. With 3 instead of 6, three capes
+ * with self-contact were 23 mm inside of bodies, instead of nowhere, and pinches dropped a tenth less
+ * time. */
 #define PATIENCE 6
 
 static drape_contact *contact_of(const drape_sim *sim)
@@ -25,7 +26,8 @@ static drape_contact *contact_of(const drape_sim *sim)
     return drape_system_contact(sim->system);
 }
 
-/* In an arena of its own: one that has failed once does not recover, and a later call may find memory. */
+/* Takes memory from an arena of its own: an arena whose allocation has failed once keeps its failure, and a
+ * later call may find memory. */
 static drape_status open_memory(drape_sim *sim)
 {
     if (sim->rescue)
@@ -68,8 +70,8 @@ static bool takes_any(const drape_sim *sim)
     return sim->realtime->active;
 }
 
-/* Relaxes cloth that bodies leave no room at the end of the step and, if it has failed several times or is
- * not to be tried again, what holds it up. Returns how many nodes. */
+/* Relaxes cloth that bodies leave no room at the end of the step and, if the step has failed several times or
+ * is not to be tried again, the pairs that hold it up. Returns how many nodes. */
 static int32_t relax(drape_sim *sim, double t1, drape_status failure, bool stopped, drape_status *status)
 {
     const drape_realtime_memory *m = sim->realtime;
@@ -122,7 +124,7 @@ static void accepted(drape_sim *sim)
     drape_sim_log_relaxed(sim);
 }
 
-/* Where contact refused the step, the pairs that hold it up are taken for such without room. */
+/* If contact refused the step, the pairs that hold it up count as having no room. */
 static drape_status advise(drape_sim *sim, const drape_attempt *last, char *text, size_t size)
 {
     bool lacks = false;
@@ -183,7 +185,7 @@ static void archive(drape_sim *sim, drape_archive *a)
         drape_relaxed_archive(drape_realtime_relaxed(sim), a);
 }
 
-/* Attempts that failed were those of the other sim. */
+/* Continues from another sim, without the count of its attempts that failed. */
 static drape_status go_on(drape_sim *to, const drape_sim *from, const int32_t *before)
 {
     const drape_status status = from->rescue ? open_memory(to) : DRAPE_OK;

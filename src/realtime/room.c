@@ -8,10 +8,12 @@
 
 #include <string.h>
 
-#define MARGIN DRAPE_BARRIER_PARABOLA /* of the activation distance, that cloth needs on either side */
-#define ACROSS 0.3 /* cosine: surfaces more upright than this to the cloth are left along their own normal */
-#define PASSES 3   /* to find the nearest place outside of a curved surface */
-#define HOLD   0.1 /* [s] cloth is relaxed at least, where no look ahead can say whether there is room */
+#define MARGIN DRAPE_BARRIER_PARABOLA /* gap that cloth needs on either side, in activation distances */
+/* Cosine of surface and cloth: cloth leaves a surface that is more upright to it along the normal of the
+ * surface. */
+#define ACROSS 0.3
+#define PASSES 3   /* iterations of the search for the nearest place outside of a curved surface */
+#define HOLD   0.1 /* [s] for which cloth is relaxed at least if it is not known whether it has no room */
 
 /* Whether a collider may be nearer to a point than the margin. */
 static bool may_be_near(const drape_contact *c, const drape_collider_pose *pose, int32_t collider,
@@ -48,7 +50,7 @@ static bool find_face_gap(const drape_contact *c, const drape_configuration *at,
 static drape_status add_face(drape_contact *c, const drape_configuration *at, int32_t collider, int32_t face)
 {
     const int32_t *n = c->model->triangle + 3 * (size_t)face;
-    bool blocked = false; /* as long as another body presses on it, the nearest surface may be at the side */
+    bool blocked = false; /* a blocked face is between two bodies: its nearest surface may be at the side */
     drape_status status = DRAPE_OK;
     drape_active_contact contact = {.pair = drape_broad_phase_surface(&c->broad, n[0], collider)};
     for (int a = 0; a < 3; a++) {
@@ -70,8 +72,8 @@ static drape_status add_face(drape_contact *c, const drape_configuration *at, in
     return status;
 }
 
-/* Contacts of relaxed cloth that no pair stands for: nodes with colliders without a smooth surface, and
- * faces, at some points of them, where features of a collider have no radius and their pairs are left out. */
+/* Contacts of relaxed cloth that are not those of pairs: of nodes with colliders that have no smooth surface,
+ * and of some points of faces with solid colliders (relaxed.h), whose features do not act. */
 static drape_status add_surfaces(drape_contact *c, const drape_configuration *given)
 {
     drape_configuration fitted = *given;
@@ -95,7 +97,7 @@ static drape_status add_surfaces(drape_contact *c, const drape_configuration *gi
     return status ? status : drape_exit_add(c, at);
 }
 
-/* ---- Looking ahead ---- */
+/* ---- Cloth without room ---- */
 
 /* A point of the cloth in a contact. */
 typedef struct cloth_point {
@@ -154,7 +156,8 @@ static bool is_blocked_by(const drape_contact *c, int32_t other, double margin, 
     return drape_relaxed_distance(c, other, q, n) < margin * (1 - 1e-6) && vec3_dot(n, direction) < 0;
 }
 
-/* Says that nodes have no room at a collider; -1: at pinned pieces of cloth. */
+/* Relaxes nodes that have no room at a collider; -1: at pinned pieces of cloth. If it may not, only notes of
+ * relaxed nodes that they are blocked. */
 static drape_status block(drape_contact *c, int32_t collider, const int32_t *node, int nodes, double t,
                           double until, bool may_relax, int32_t *added)
 {
@@ -166,8 +169,9 @@ static drape_status block(drape_contact *c, int32_t collider, const int32_t *nod
     return status;
 }
 
-/* Around a pin inside a collider cloth can be outside only beyond its depth, less the cloth between: edge
- * by edge, from every pin inside, the depth that is left. */
+/* Around a pin inside a collider, cloth can be outside only where the length of cloth from the pin is more
+ * than the depth of the pin. reach: (node_count) the depth less that length, found edge by edge from every
+ * pin inside. */
 static void reach_from_pins(const drape_contact *c, int32_t collider, double margin, double *reach)
 {
     const drape_model *m = c->model;
@@ -197,7 +201,7 @@ static drape_status block_pins(drape_contact *c, int32_t collider, double margin
     const double *reach = drape_relaxed_of(c)->reach;
     reach_from_pins(c, collider, margin, drape_relaxed_of(c)->reach);
     for (int32_t e = 0; !status && e < m->edge_count; e++) {
-        const int32_t *n = m->edge + 2 * (size_t)e; /* pins among pins do not touch anything */
+        const int32_t *n = m->edge + 2 * (size_t)e; /* pins whose neighbours are all pins have no contacts */
         const bool free = !m->pinned[n[0]] || !m->pinned[n[1]];
         for (int k = 0; !status && free && k < 2; k++)
             if (reach[n[k]] > 0)
@@ -223,8 +227,8 @@ static drape_status block_between(drape_contact *c, int32_t collider, const clot
     return status;
 }
 
-/* A face that is pierced by parts which enclose a volume may not be near them any more, and its nodes may be
- * outside: points of the face are looked at, between which a tip may be missed. */
+/* Blocks faces that a solid collider (relaxed.h) pierces. Its surface may be far from such a face, and the
+ * nodes of the face outside, so points of the face are tested; a tip between these points may be missed. */
 static drape_status block_pierced(drape_contact *c, int32_t collider, double t, bool may_relax,
                                   int32_t *added)
 {
@@ -251,22 +255,22 @@ static drape_status block_pierced(drape_contact *c, int32_t collider, double t, 
     return status;
 }
 
-static drape_status go_to(drape_contact *c, const double *x, double t)
+static drape_status evaluate_at(drape_contact *c, const double *x, double t)
 {
     return drape_contact_update(c, &(drape_contact_at){.x = x, .t = t, .span = {t, t}});
 }
 
-/* Looks for cloth without room where the pins and colliders of time t1 meet the nodes x (node_count x 3) of
- * time t, and relaxes what it finds, if it may: *added nodes. Moves the point of contact. */
-static drape_status look_ahead(drape_contact *c, const double *x, double t, double t1, bool may_relax,
-                               int32_t *added)
+/* Evaluates contact where the pins and colliders of time t1 meet the nodes x (node_count x 3) of time t, and
+ * blocks the cloth that has no room there; *added: nodes that were not relaxed before. */
+static drape_status find_no_room(drape_contact *c, const double *x, double t, double t1, bool may_relax,
+                                 int32_t *added)
 {
     drape_relaxed_set *relaxed = drape_relaxed_of(c);
     const bool between = c->between_steps;
     memcpy(c->to, x, 3 * (size_t)c->model->node_count * sizeof *x);
     drape_motion_place_pins(c->motion, t1, c->to);
-    c->between_steps = true; /* with candidates of its own, as the path of the step leads elsewhere */
-    drape_status status = go_to(c, c->to, t1);
+    c->between_steps = true; /* with the candidates of queries: the path of the step leads elsewhere */
+    drape_status status = evaluate_at(c, c->to, t1);
     c->between_steps = between;
     if (status)
         return status;
@@ -297,14 +301,14 @@ static drape_status look_ahead(drape_contact *c, const double *x, double t, doub
         if (drape_relaxed_of(c)->solid[k])
             status = block_pierced(c, k, t, may_relax, added);
     }
-    c->listed = false; /* which faces act depends on what is blocked, and their laws on what is relaxed */
+    c->listed = false; /* which contacts there are, and their laws, depends on what is blocked and relaxed */
     return status;
 }
 
 /* ---- A step that failed ---- */
 
-/* Relaxes what a pair needs to get through: the nodes of its cloth; of cloth and pinned cloth the free
- * nodes of the piece that meets the other one. */
+/* Relaxes what a pair needs to pass: the nodes of its cloth or, if it is one of cloth and pinned cloth, the
+ * free nodes of the piece that meets the pinned one. */
 static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
 {
     const drape_model *m = c->model;
@@ -323,10 +327,9 @@ static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double 
     return status;
 }
 
-/* The pairs with bodies, or those of cloth and pinned cloth, among the one that refused the step and those
- * that are as near as it before the step. */
-static drape_status relax_blockers_of(drape_contact *c, drape_relax_extent extent, bool bodies,
-                                      int32_t *added)
+/* Relaxes the pair that refused the step and, by extent, the near pairs before the step: of them the pairs
+ * with bodies, or those of cloth and pinned cloth. */
+static drape_status relax_refusing(drape_contact *c, drape_relax_extent extent, bool bodies, int32_t *added)
 {
     drape_status status = DRAPE_OK;
     if (c->refused && bodies == (c->refusing.collider >= 0))
@@ -340,15 +343,15 @@ static drape_status relax_blockers_of(drape_contact *c, drape_relax_extent exten
 
 static drape_status relax(drape_contact *c, double t1, drape_relax_extent extent, int32_t *added)
 {
-    drape_status status = look_ahead(c, c->start, c->start_t, t1, true, added);
+    drape_status status = find_no_room(c, c->start, c->start_t, t1, true, added);
     if (!status && *added == 0 && extent != DRAPE_RELAX_NONE) {
-        /* Bodies that are let in come out again. Cloth that passes through pinned cloth stays on its other
-         * side, so it is relaxed last. */
-        status = go_to(c, c->start, c->start_t);
+        /* A body that is let into cloth comes out again. Cloth that passes through pinned cloth stays on the
+         * other side, so pinned cloth is relaxed last. */
+        status = evaluate_at(c, c->start, c->start_t);
         if (!status)
-            status = relax_blockers_of(c, extent, true, added);
+            status = relax_refusing(c, extent, true, added);
         if (!status && *added == 0 && extent == DRAPE_RELAX_NEAR)
-            status = relax_blockers_of(c, extent, false, added);
+            status = relax_refusing(c, extent, false, added);
     }
     c->listed = false;
     return status;
@@ -360,17 +363,18 @@ drape_status drape_room_relax(drape_contact *c, double t1, drape_relax_extent ex
     *added = 0;
     if (!c)
         return DRAPE_OK;
-    drape_status status = go_to(c, c->start, c->start_t);
+    drape_status status = evaluate_at(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
         status = relax(c, t1, extent, added);
-    if (!status && !(status = go_to(c, c->start, c->start_t)))
+    if (!status && !(status = evaluate_at(c, c->start, c->start_t)))
         c->stiffening.work += drape_contact_potential(c) - before;
     c->seconds += drape_clock_seconds() - clock;
     return status;
 }
 
-/* All that is too near at the end, and then pair by pair what refuses the path to there. */
+/* Relaxes all pairs that are too near at the end, and then one by one the pairs that refuse the path to
+ * there. */
 drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
 {
     drape_reason reason = DRAPE_REASON_CONVERGED;
@@ -378,10 +382,10 @@ drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
     int32_t added = 1;
     if (!c)
         return DRAPE_OK;
-    drape_status status = go_to(c, c->start, c->start_t);
+    drape_status status = evaluate_at(c, c->start, c->start_t);
     const double before = status ? 0 : drape_contact_potential(c);
     if (!status)
-        status = go_to(c, x, t1);
+        status = evaluate_at(c, x, t1);
     for (int32_t i = 0; !status && i < c->active.near_count; i++) {
         const drape_near_pair *near = &c->active.near[i];
         if (near->gap < drape_pair_least_gap(&near->pair, c->broad.rounding))
@@ -396,7 +400,7 @@ drape_status drape_room_let_in(drape_contact *c, const double *x, double t1)
             status = relax_pair(c, &c->refusing, c->start_t, &added);
     }
     c->listed = false;
-    if (!status && !(status = go_to(c, c->start, c->start_t)))
+    if (!status && !(status = evaluate_at(c, c->start, c->start_t)))
         c->stiffening.work += drape_contact_potential(c) - before;
     return status;
 }
@@ -429,7 +433,7 @@ static void measure(drape_contact *c)
     }
 }
 
-/* A node is out only if the collider pierces none of its faces. */
+/* Whether the collider of a relaxed node pierces a face of the node: then the node is not out. */
 static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
 {
     bool found = false;
@@ -441,7 +445,7 @@ static bool is_pierced(const drape_contact *c, const drape_relaxed_node *node)
     return found;
 }
 
-/* A node is held again where the force that holds it is no more than what pushes it already. */
+/* Whether a node is held again: if contact would hold it with no more force than now pushes it out. */
 static bool is_out(void *user, const drape_relaxed_node *node)
 {
     const drape_contact *c = user;
@@ -456,18 +460,18 @@ static bool is_out(void *user, const drape_relaxed_node *node)
            !is_pierced(c, node);
 }
 
-/* Measures the relaxed nodes at the present point, which is listed, and holds those again that came out.
- * *changed: some were. */
+/* Measures the relaxed nodes where contact is evaluated, and holds the nodes again that came out. *changed:
+ * whether the laws of contacts are others than before. */
 static drape_status review(drape_contact *c, double t, bool *changed)
 {
     drape_relaxed_set *relaxed = drape_relaxed_of(c);
     drape_contact_fit_bodies(c, c->pose);
     measure(c);
     const double before = relaxed->t;
-    /* With this factor the pressure is that of the pairs which are held, at the margin and with the scene's
-     * stiffness. With that of the present, which bodies that close upon cloth have raised, by up to ten
-     * thousand, the pressure would tear at cloth that hangs over the edge of a body, long after they have
-     * parted. */
+    /* With this factor the pressure is that of pairs which are held, at the margin and with the scene's
+     * stiffness. The present stiffness may have been raised ten thousand times by bodies that close upon
+     * cloth; with it the pressure would tear at cloth that hangs over the edge of a body, long after the
+     * bodies have parted. */
     const drape_contact_def *def = &c->model->contact;
     drape_relaxed_update(relaxed, t, -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure);
     *changed = relaxed->t != before;
@@ -477,8 +481,8 @@ static drape_status review(drape_contact *c, double t, bool *changed)
     return drape_exit_find(c, t);
 }
 
-/* Looks for room at the end of the step, where some cloth has none already, and holds again what has come
- * out. */
+/* If some cloth is relaxed: holds the nodes again that have come out, and finds the cloth without room at the
+ * end of the step. */
 static drape_status begin(drape_contact *c, const drape_contact_at *at)
 {
     drape_relaxed_set *relaxed = drape_relaxed_of(c);
@@ -490,7 +494,7 @@ static drape_status begin(drape_contact *c, const drape_contact_at *at)
         return DRAPE_OK;
     drape_status status = review(c, at->t, &changed);
     if (!status && t1 > at->t)
-        status = look_ahead(c, at->x, at->t, t1, relaxed->may_relax, &added);
+        status = find_no_room(c, at->x, at->t, t1, relaxed->may_relax, &added);
     c->listed = c->listed && !changed;
     return status ? status : drape_contact_update(c, at);
 }
@@ -503,7 +507,7 @@ void drape_room_expect(drape_contact *c, double t1, bool may_relax)
     drape_relaxed_of(c)->may_relax = may_relax;
 }
 
-/* ---- Contact that asks ---- */
+/* ---- Opening ---- */
 
 drape_status drape_room_open(drape_arena *arena, drape_contact *c)
 {
@@ -517,7 +521,7 @@ drape_status drape_room_open(drape_arena *arena, drape_contact *c)
     return DRAPE_OK;
 }
 
-/* Where nothing can be relaxed, contact asks for the time being. */
+/* Opens contact for the duration of the call if drape_room_open was not called. */
 drape_status drape_room_lacks(drape_contact *c, double t1, drape_relax_extent extent, bool *lacks)
 {
     int32_t found = 0;

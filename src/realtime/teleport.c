@@ -15,8 +15,9 @@
 
 #include <string.h>
 
-/* Pins on a line, or a single one, leave a rotation free: then the smallest one is taken. This share of the
- * spread of the pins counts against any rotation, and turns it by as much at most [rad]. */
+/* Pins on a line, or a single pin, leave a rotation free: then the smallest one is chosen, since this share
+ * of the spread of the pins counts against any rotation. It changes a rotation that is not free by no more
+ * than that [rad]. */
 #define REST 1e-6
 
 /* ---- The best rigid motion ---- */
@@ -99,7 +100,7 @@ static bool is_in(const drape_cloth *cloth, int32_t node)
     return node >= cloth->first_node && node < cloth->first_node + cloth->mesh.node_count;
 }
 
-/* Where all nodes with a pin are to be after `seconds`: those that are not sent go on as they would. */
+/* The targets of all pins after `seconds`: those that are not sent follow their motion. */
 static const double *targets(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                              const double *positions)
 {
@@ -112,7 +113,8 @@ static const double *targets(drape_sim *sim, int32_t count, const int32_t *nodes
     return to;
 }
 
-/* The mean velocity of the sent pins of a cloth: on arrival or, if the host gives none, theirs so far. */
+/* The mean velocity of the sent pins of a cloth on arrival; if the host gives none, they keep their present
+ * one. */
 static void mean_velocity(const drape_sim *sim, const drape_cloth *cloth, int32_t count, const int32_t *nodes,
                           const double *velocities, const drape_placement *by, double mean[3])
 {
@@ -135,8 +137,8 @@ static void mean_velocity(const drape_sim *sim, const drape_cloth *cloth, int32_
         mean[k] /= sent;
 }
 
-/* Before any cloth is placed, all placements are checked, so that after an error nothing has changed. That
- * of a cloth does not depend on the others. */
+/* All placements are checked before any cloth is placed, so that after an error nothing has changed. The
+ * placement of a cloth does not depend on the other cloths. */
 drape_status drape_teleport_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                                  const double *positions, const double *velocities)
 {
@@ -193,9 +195,9 @@ static int32_t count_carried(const drape_sim *sim, int32_t collider, const drape
     return carried;
 }
 
-/* Cloth that rides on a collider goes with it: as the collider does or, if it has other pins, too, by the
- * rigid motion that fits all of them best. A collider that was moved by hand takes each to the place that its
- * pins have then, so it does not matter in which order several of them are sent. */
+/* Cloth with pins on a collider is placed with it: as the collider is or, if it has other pins, too, by the
+ * rigid motion that fits all pins best. That depends on the final places of the pins, so it does not matter
+ * in which order several colliders are sent. */
 static void carry(drape_sim *sim, int32_t collider, const drape_placement *by)
 {
     const drape_model *m = sim->model;
@@ -230,8 +232,8 @@ static drape_status check_carried(const drape_sim *sim, int32_t collider, const 
     return status;
 }
 
-/* Whether some point of a collider would be too fast: at most as its pivot, and by the turn as the point
- * that is farthest from it. */
+/* Whether some point of a collider may be too fast: its speed is at most that of the pivot plus that by which
+ * the turn moves the farthest point. */
 static bool is_swung_too_fast(const drape_sim *sim, int32_t collider, double seconds, const drape_sent *to,
                               const double from[3], const double now[9])
 {

@@ -206,7 +206,6 @@ static void compare_forces(drape_contact *a, drape_contact *b, size_t n, double 
     "{'type': 'capsule', 'a': [-0.15,0,0], 'b': [-0.05,0.05,0.1], 'radius': 0.02},"                          \
     "{'type': 'plane', 'point': [0,-0.2,0], 'normal': [0,1,0]}]%s}"
 
-/* So few that no trees are fitted: the nodes near each collider are scanned. */
 #define FEW_FEATURES                                                                                         \
     "{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'contact': {'distance': 1.5e-2}, 'duration': 1, "         \
     "'colliders': [{'type': 'sphere', 'center': [0.1,0.1,0], 'radius': 0.05},"                               \

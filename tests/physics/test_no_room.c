@@ -5,7 +5,7 @@
  * "stop" the run stops and names the pair.
  */
 #include "base/vec3.h"
-#include "realtime/report.h"
+#include "realtime/relaxed_report.h"
 #include "realtime/room.h"
 #include "support/bytes.h"
 #include "support/scene.h"

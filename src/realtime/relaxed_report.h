@@ -1,16 +1,16 @@
-/* report.h: the cloth that bodies leave no room (relaxed.h), as messages, reports and the summary
- * see it. */
-#ifndef DRAPE_REALTIME_REPORT_H
-#define DRAPE_REALTIME_REPORT_H
+/* relaxed_report.h: the cloth that bodies leave no room (relaxed.h), for messages, reports and the
+ * summary. */
+#ifndef DRAPE_REALTIME_RELAXED_REPORT_H
+#define DRAPE_REALTIME_RELAXED_REPORT_H
 
 #include "realtime/realtime.h"
 #include "realtime/relaxed.h"
 
-/* NULL: nothing was ever to be relaxed. */
+/* The relaxed cloth of a sim; NULL: there is no contact. */
 drape_relaxed_set *drape_realtime_relaxed(const drape_sim *sim);
 
-/* What became of the cloth so far at a collider; -1: at pinned pieces of cloth. Never NULL; most is 0 if
- * nothing was relaxed there. */
+/* The total at a collider; -1: at pinned pieces of cloth. Never NULL; its `most` is 0 if nothing was relaxed
+ * there. */
 const drape_relaxed_total *drape_sim_relaxed_total(const drape_sim *sim, int32_t collider);
 const char *drape_sim_relaxed_name(const drape_sim *sim, int32_t collider);
 

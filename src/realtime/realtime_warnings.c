@@ -1,11 +1,11 @@
-/* warnings.c: what drape_sim_warning looks for in runs with a time budget or with relaxed cloth. */
-#include "realtime/report.h"
+/* realtime_warnings.c: what drape_sim_warning reports of runs with a time budget or with relaxed cloth. */
+#include "realtime/relaxed_report.h"
 
 #include <stdio.h>
 
-#define SLOW 0.1 /* of the simulated time: dropped */
+#define SLOW 0.1 /* dropped time, in the simulated time, from which there is a warning */
 
-/* Bodies that left cloth no room were let in: where, how long and how deep. */
+/* Where, how long and how deep cloth was relaxed. */
 static bool had_no_room(drape_sim *sim, char *text, size_t size)
 {
     int32_t places = 0, most = -1;
@@ -31,7 +31,7 @@ static bool had_no_room(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-/* The last resort of advances with a time budget. */
+/* Held steps (hold.h). */
 static bool was_held(drape_sim *sim, char *text, size_t size)
 {
     const drape_statistics *s = &sim->statistics;
@@ -44,7 +44,7 @@ static bool was_held(drape_sim *sim, char *text, size_t size)
     return true;
 }
 
-/* Steps that let cloth pass through pinned cloth, or began with cloth that passed through itself. */
+/* Calls after which edges passed through triangles of the cloth. */
 static bool passed_through(drape_sim *sim, char *text, size_t size)
 {
     const drape_realtime_memory *m = sim->realtime;

@@ -1,5 +1,5 @@
-/* report.c: see report.h. */
-#include "realtime/report.h"
+/* relaxed_report.c: see relaxed_report.h. */
+#include "realtime/relaxed_report.h"
 
 #include <math.h>
 
