@@ -55,7 +55,7 @@ bool drape_contact_has_begun(const drape_contact *contact, const double *x, doub
 /* Whether there is cloth that contact does not hold somewhere (contact/exempt.h). */
 bool drape_contact_exempts(const drape_contact *contact);
 
-/* Ends the step. Queries until the next one have candidates of their own: the next step can continue with
+/* Ends the step. Queries before the next step have candidates of their own, so that the next step can use
  * those of this one. */
 void drape_contact_end(drape_contact *contact);
 
@@ -107,68 +107,66 @@ bool drape_contact_has_friction(const drape_contact *contact);
 /* Whether DRAPE_CONTACT_SYMMETRIC is symmetric: no friction follows the normal force within a step. */
 bool drape_contact_is_symmetric(const drape_contact *contact);
 
-/* Takes out of values, to which drape_contact_add_jacobian added a share of DRAPE_CONTACT_SYMMETRIC with the
- * same weight, how friction changes with the normal force and with the place of contact: what remains of
- * friction is symmetric, and positive semidefinite for each contact in its tangential plane. */
+/* Subtracts from values, to which drape_contact_add_jacobian added a share of DRAPE_CONTACT_SYMMETRIC with
+ * the same weight, the derivatives of friction by the normal force and by the place of contact. The rest of
+ * friction is symmetric, and for each contact positive semidefinite in its tangential plane. */
 void drape_contact_fix_friction(drape_contact *contact, double weight, double share,
                                 const drape_pattern *pattern, double *values);
 
-/* Adds to values what DRAPE_CONTACT_EXACT has beyond DRAPE_CONTACT_GAUSS_NEWTON: how friction changes with
- * the normal force, and what bounds and the Gauss-Newton part leave out. */
+/* Adds to values the difference of DRAPE_CONTACT_EXACT and DRAPE_CONTACT_GAUSS_NEWTON. */
 void drape_contact_add_remainder(drape_contact *contact, double weight, const drape_pattern *pattern,
                                  double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);
 
-/* Lists the pairs of cloth with cloth that are near each other, for a pattern that will hold for a while:
- * four nodes each, valid until the next call. Returns their number; -1: out of memory. */
+/* Lists the pairs of cloth with cloth that are near each other, four nodes each, for a pattern that has the
+ * blocks of later contacts, too; valid until the next call. Returns their number; -1: out of memory. */
 int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nodes);
 
 /* The list made by the last drape_contact_list_couplings, or read from an archive. */
 int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
-/* Takes from contact of the same cloth what a step leaves for the next ones: which pairs are inside, its
- * stiffness and activation distances. before (collider_count): the number that each collider has there; -1:
- * it is new. Errors: DRAPE_E_MEMORY. */
+/* Copies from contact of the same cloth what a step leaves for the next one: the pairs that are inside, the
+ * stiffness and the activation distances. before (collider_count): the number that each collider has there;
+ * -1: it is new. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_continue(drape_contact *contact, const drape_contact *from, const int32_t *before);
 
 /* Archives the beginning of the step, from which everything else follows, and the couplings. */
 void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
-/* The part of it that is the same on all ranks: the stiffness and the activation distances. What was read
- * is of a step that has not begun. */
+/* Archives only the part that is the same on all ranks: the stiffness and the activation distances, as before
+ * the first step. */
 void drape_contact_archive_stiffness(drape_contact *contact, drape_archive *a);
 
-/* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other,
- * with a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at
- * each node to the smallest fraction of its pairs; where a displacement is longer than a few edges, to such
- * a length without a look at pairs. One that throws nodes farther than the scene is large is shortened to
- * about an edge. again: of_node is that of the last call from x, and y what it left of the displacement at
- * each node, so that pairs which it did not shorten are not looked at again; of_node is set to the fractions
- * of y. If the watched flag is raised meanwhile: 0, also at each node. */
+/* The largest step fraction from x to y (node_count x 3) on which no two pieces pass through each other, with
+ * a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at each
+ * node to the smallest fraction of its pairs. If some node goes farther than a few edges, pairs are not
+ * searched: such nodes are shortened to that length, or to about an edge if the displacement throws nodes
+ * farther than the scene is large. again: y is what the last call from x has left of the displacement, and
+ * of_node its result, which is replaced by the fractions of y; pairs whose nodes that call did not shorten
+ * are known to limit nothing. If the watched flag is raised meanwhile, the result is 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    bool again, double *of_node);
 
-/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, aside from
- * moving colliders: a node that one of them would reach on the straight path from the beginning of the step
- * slides on it from there on. Nodes that begin inside stay. */
+/* Moves the free nodes of y (node_count x 3), a guess of the end of the step at time t, aside from moving
+ * colliders: a node that would meet a collider on the straight path from the beginning of the step slides on
+ * the collider from there on. Nodes that begin inside keep their place. */
 void drape_contact_sweep(drape_contact *contact, double t, double *y);
 
-/* Where cloth would pass through cloth on the straight path from the beginning of the step to y, which is
- * that beginning after drape_contact_sweep: takes it along with the rigid collider that is nearest. y is as
- * before if that does not keep all of it apart. */
+/* Moves cloth that would pass through cloth on the straight path from the beginning of the step to y along
+ * with the nearest rigid collider. y: the beginning of the step after drape_contact_sweep; it is unchanged if
+ * this does not keep all cloth apart. */
 void drape_contact_carry_layers(drape_contact *contact, double t, double *y);
 
 /* Whether cloth at x with velocities v (node_count x 3) at time t may meet a body or another piece of cloth
- * in the next so many seconds: free nodes go straight on, pins and colliders as far as their motion is
- * known. An estimate, because forces are left out. */
+ * in the next so many seconds. An estimate: free nodes are taken to keep their velocities, pins and colliders
+ * follow their motion. */
 bool drape_contact_may_meet(drape_contact *contact, const double *x, const double *v, double t,
                             double seconds);
 
-/* Whether a pair of features would be too near at x, as drape_contact_check tests it, or too near on the
- * path from the beginning of the step to there, while pins and colliders move straight between the kinks of
- * their motion up to time t. */
+/* Whether drape_contact_check would refuse a step that ends at x and time t because of a pair of features, at
+ * its end or on its path. */
 bool drape_contact_crosses(drape_contact *contact, const double *x, double t, drape_reason *reason,
                            drape_diagnostic *diagnostic);
 
@@ -178,7 +176,7 @@ bool drape_contact_crosses(drape_contact *contact, const double *x, double t, dr
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, drape_reason *reason,
                                  drape_diagnostic *diagnostic);
 
-/* The nearest active pair at the last point: what holds a step up whose equations have no solution. */
+/* The nearest active pair at the last point, which may be why the equations of a step have no solution. */
 bool drape_contact_nearest(const drape_contact *contact, drape_diagnostic *diagnostic);
 
 /* The number of active contacts at the last point, and their smallest gap [m], INFINITY if there are none. */

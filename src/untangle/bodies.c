@@ -37,7 +37,7 @@ static bool is_near(const drape_untangler *u, int32_t collider, const int32_t *n
     return true;
 }
 
-/* A point of a face, with these weights of its nodes, is to be at the wanted distance. */
+/* Adds the bound that a point of a face, with these weights of its nodes, is at the wanted distance. */
 static void push(drape_untangler *u, int32_t collider, const int32_t *node, const double *weight, int nodes,
                  double d, const double n[3])
 {
@@ -54,8 +54,8 @@ static void push(drape_untangler *u, int32_t collider, const int32_t *node, cons
 
 /* ---- Nodes ---- */
 
-/* The length of the path out of all bodies, in a direction, from a point of the piece of a node; infinite: it
- * does not lead out. */
+/* The length of the path in a direction from a point of the piece of a node to outside of all bodies;
+ * infinite if it does not lead out. */
 static double exit_length(const drape_untangler *u, int32_t node, const double *x, const double direction[3])
 {
     double length = 0;
@@ -85,7 +85,7 @@ static bool is_in(const drape_untangler *u, int32_t node, int32_t piece)
     return u->piece[node] == piece && u->depth[node] < -u->broad.rounding;
 }
 
-/* A direction is as good as the longest of the paths of the nodes is short. */
+/* Chooses a direction if the longest path of a node out along it is shorter than along those tried before. */
 static void try_direction(const drape_untangler *u, int32_t piece, const double v[3], double *shortest,
                           drape_untangle_exit *out)
 {
@@ -105,8 +105,9 @@ static void try_direction(const drape_untangler *u, int32_t piece, const double 
     memcpy(out->direction, direction, sizeof direction);
 }
 
-/* Of a piece that is inside, unless its nodes agree. Directions that are tried: the mean of those
- * of its nodes, that of the least deep node, and both sides of the sheet, which needs no room sideways. */
+/* Chooses the exit of a piece that is inside, unless the directions of its nodes agree. Tried are the mean of
+ * these directions, that of the least deep node, and both sides of the sheet, to which it needs no room
+ * sideways. */
 static void choose_exit(drape_untangler *u, int32_t piece, drape_untangle_exit *out)
 {
     const drape_model *m = u->model;
@@ -164,8 +165,8 @@ static drape_status choose_exits(drape_untangler *u)
     return status;
 }
 
-/* Where a point at x of the piece of a node, which is in a body, is to go: the direction, and the signed
- * distance d along it. */
+/* If the piece of a node has an exit that leads out from x, a point of the piece in a body, sets n to the
+ * direction of the exit, and d to the signed distance along it. */
 static void turn_to_exit(const drape_untangler *u, int32_t node, const double *x, double *d, double n[3])
 {
     const drape_untangle_exit *leave = &u->exit[u->piece[node]];
@@ -301,8 +302,9 @@ static void weights_at(const drape_untangler *u, const int32_t *node, const doub
         weight[a] = -closest.c[a + 1];
 }
 
-/* From a point where an edge of the collider goes through a face to the deepest point of the face around it:
- * what is inside there is a wedge of any direction. */
+/* Moves from a point where an edge of the collider passes through a face to the deepest point of the face
+ * around it, by a pattern search: the part of the face that is inside there is a wedge of unknown
+ * direction. */
 static void deepen(const drape_untangler *u, int32_t collider, const int32_t *node, double weight[3])
 {
     double x[3], v[3], w[3], n[3];
@@ -365,8 +367,7 @@ drape_status drape_untangle_bodies(drape_untangler *u)
 {
     memset(u->sunk, 0, (size_t)u->model->node_count * sizeof *u->sunk);
     u->sunk_count = 0;
-    /* The depth of all nodes in the body in which they are deepest, and the gradient of the distance
-     * there. */
+    /* The depth of each node in the body in which it is deepest, and the gradient of the distance there. */
     const drape_model *m = u->model;
     for (int32_t i = 0; i < m->node_count; i++)
         u->depth[i] = 0;

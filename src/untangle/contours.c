@@ -13,9 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RINGS  4    /* of nodes of a sheet that passes through itself that may be near it on the wrong side */
-#define STRIDE 0.3  /* of an edge: by which it is moved along the gradient */
-#define STEEP  0.05 /* the least sine of an edge and a triangle, for the gradient */
+#define RINGS  4    /* rings of nodes around a curve that may be on the wrong side of their own sheet */
+#define STRIDE 0.3  /* by which an edge is moved along the gradient, in its length */
+#define STEEP  0.05 /* least sine of an edge and a triangle by which the gradient is divided */
 
 /* ---- Crossings ---- */
 
@@ -168,8 +168,8 @@ typedef struct curve {
     int32_t count;
 } curve;
 
-/* Marks the edges of a trace; of them, blocked ones are those that the curve passes through an odd number of
- * times. Returns whether it has any that are of cloth. */
+/* Counts how often the curve passes through each edge of a trace; an edge is blocked if the number is odd.
+ * Returns whether the trace has any edges of cloth. */
 static bool mark(drape_untangler *u, const curve *k, int trace)
 {
     bool any = false;
@@ -200,8 +200,8 @@ static bool spread(drape_untangler *u, int32_t count, bool through, double price
     for (int32_t i = 0; agree && i < count; i++) {
         const int32_t node = u->queue[i];
         const int8_t own = u->colour[node];
-        /* What it costs to move a node: a pin, more than all of the cloth, so that its part is not moved if
-         * another can be. */
+        /* The price of moving a node is its area. A pin costs more than all of the cloth, so that a part with
+         * pins is not moved if another part can be. */
         price[own] += u->broad.node_area[node] + (u->mobility[node] > 0 ? 0 : 2 * u->area);
         for (int32_t a = s->edges.first[node]; agree && a < s->edges.first[node + 1]; a++) {
             const int32_t e = s->edges.element[a], *ends = s->edge + 2 * (size_t)e,
@@ -293,8 +293,9 @@ static double wanted_between(const drape_untangler *u, int32_t sheet, int32_t ot
            drape_untangle_wanted(u, u->broad.distance[most - cloths]);
 }
 
-/* The nodes of a triangle that are on the wrong side pass the other triangle at a point of the curve. Returns
- * the side of that which is right: 1 if its normal points there, -1 if not, 0 if this pair does not tell. */
+/* Adds the bounds by which the nodes of a triangle that are on the wrong side pass the other triangle, at a
+ * point of the curve. Returns the right side of the other triangle: 1 if its normal points there, -1 if not,
+ * 0 if the pair does not show it. */
 static int pass(drape_untangler *u, int32_t triangle, int32_t other, int8_t wrong, const double at[3])
 {
     const int32_t *node = u->sheets.triangle + 3 * (size_t)triangle,
@@ -332,8 +333,8 @@ static bool is_boundary(const drape_sheets *s, int32_t a, int32_t b)
     return edge >= 0 && s->edge_triangle[2 * (size_t)edge + 1] < 0;
 }
 
-/* A node of a part on the wrong side, away from the curve, goes towards the place of the other sheet that is
- * nearest to it, as far as a sweep goes: so the part turns as a whole and is not pulled along by its edge. */
+/* Moves a node of a part on the wrong side, away from the curve, towards the nearest place of the other
+ * sheet, as far as a sweep goes, so that the part turns as a whole and is not pulled along by its edge. */
 static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int side)
 {
     const drape_bvh *tree = &u->tree[sheet];
@@ -343,7 +344,7 @@ static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int sid
     if (place.triangle < 0)
         return;
     const int32_t *corner = tree->node + 3 * (size_t)place.triangle;
-    /* A place on the boundary of the other sheet does not tell on which side the node is. */
+    /* A place on the boundary of the other sheet does not show on which side the node is. */
     for (int a = 0; a < 3; a++)
         if (place.weights[a] <= 0 && is_boundary(&u->sheets, corner[(a + 1) % 3], corner[(a + 2) % 3]))
             return;
@@ -362,8 +363,9 @@ static void follow_part(drape_untangler *u, int32_t node, int32_t sheet, int sid
     drape_untangle_bound(u, &bound);
 }
 
-/* All nodes of the wrong part may be near the other sheet on its wrong side; of a sheet that passes through
- * itself, only those next to the curve, since the others are near right parts of it. */
+/* Adds the passages of the wrong part: all of its nodes may be near the other sheet on the wrong side. In a
+ * sheet that passes through itself only nodes next to the curve may be, since the others are near right parts
+ * of the sheet. */
 static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong, int32_t sheet, int side)
 {
     const drape_sheets *s = &u->sheets;
@@ -401,7 +403,7 @@ static void let_pass(drape_untangler *u, const curve *k, int trace, int8_t wrong
         u->colour[u->queue[i]] = wrong;
 }
 
-/* Goes through the pairs of triangles of a curve, each once. */
+/* Lets the wrong part of a trace pass, at each pair of triangles of the curve once. */
 static void pass_all(drape_untangler *u, const curve *k, int trace, int8_t wrong)
 {
     const int32_t contour = u->crossing[k->crossing[0]].contour;
@@ -483,8 +485,8 @@ static void shorten(drape_untangler *u, const curve *k)
         const double stride = STRIDE * vec3_norm(e) * size / sqrt(1 + size * size);
         for (int a = 0; a < 3; a++)
             g[a] /= size;
-        /* the crossing is a point of both: their distance along g is 0 now. The triangle is left where it is
-         * if the edge can move: its own edges and those that pass through it move it */
+        /* the crossing is a point of edge and triangle: their distance along g is 0 now. Each of them gets
+         * half of the stride */
         const drape_half_space bound = {.node = {ends[0], ends[1], -1, -1},
                                         .c = {1 - c->t, c->t},
                                         .normal = {g[0], g[1], g[2]},
