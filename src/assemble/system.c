@@ -518,17 +518,24 @@ static void evaluate_wind(drape_system *system, drape_request *want)
     want->wind_gradient = system->wind.gradient;
 }
 
+static void add_forces(drape_system *system, drape_request want, double *g)
+{
+    evaluate_wind(system, &want);
+    drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
+    if (want.conservative)
+        drape_system_add_loads(system, want.point->x, g);
+    if (evaluate_contact(system, want.point))
+        drape_contact_add_forces(system->contact, want.conservative, true, g);
+}
+
 void drape_system_sum_forces(drape_system *system, const drape_point *given, const bool *without, double *g)
 {
     const drape_point point = point_in_space(system, given);
-    drape_request want = {.point = &point, .conservative = true, .dissipative = true, .without = without};
     system->frame_t = point.t;
     drape_system_cancelled(system);
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    drape_system_add_loads(system, point.x, g);
-    if (evaluate_contact(system, &point))
-        drape_contact_add_forces(system->contact, true, true, g);
+    add_forces(
+        system,
+        (drape_request){.point = &point, .conservative = true, .dissipative = true, .without = without}, g);
 }
 
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
@@ -583,11 +590,7 @@ void drape_system_project_matrix(const drape_system *system, double *values)
 void drape_system_dissipation(drape_system *system, const drape_point *given, double *g)
 {
     const drape_point point = point_in_space(system, given);
-    drape_request want = {.point = &point, .dissipative = true};
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    if (evaluate_contact(system, &point))
-        drape_contact_add_forces(system->contact, false, true, g);
+    add_forces(system, (drape_request){.point = &point, .dissipative = true}, g);
 }
 
 /* ---- Jacobians ---- */
@@ -595,6 +598,17 @@ void drape_system_dissipation(drape_system *system, const drape_point *given, do
 static drape_sums into_values(const drape_system *system, double *values)
 {
     return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
+}
+
+static void add_jacobian(drape_system *system, drape_request want, drape_contact_derivatives which,
+                         double *values)
+{
+    const drape_sums to = into_values(system, values);
+    evaluate_wind(system, &want);
+    drape_summer_add(system->summer, &want, &to);
+    if (evaluate_contact(system, want.point))
+        drape_contact_add_jacobian(system->contact, want.velocity ? 0 : want.point->weight, which,
+                                   want.positive_share, system->pattern, values);
 }
 
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
@@ -607,18 +621,13 @@ void drape_system_jacobian_without(drape_system *system, const drape_point *give
                                    double positive_share, const bool *without, double *values)
 {
     const drape_point point = point_in_space(system, given);
-    drape_request want = {.point = &point,
-                          .hessian = true,
-                          .conservative = true,
-                          .dissipative = true,
-                          .positive_share = positive_share,
-                          .without = without};
-    const drape_sums to = into_values(system, values);
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, &point))
-        drape_contact_add_jacobian(system->contact, point.weight, point.contact, positive_share,
-                                   system->pattern, values);
+    const drape_request want = {.point = &point,
+                                .hessian = true,
+                                .conservative = true,
+                                .dissipative = true,
+                                .positive_share = positive_share,
+                                .without = without};
+    add_jacobian(system, want, point.contact, values);
     drape_drag_springs_add_hessian(&system->drag, system->model, system->pattern, values);
     const drape_model *model = system->model;
     const drape_pattern *pattern = system->pattern;
@@ -687,18 +696,13 @@ void drape_system_pairs(const drape_system *system, int32_t term, const drape_po
 void drape_system_remainder(drape_system *system, const drape_point *given, double *values)
 {
     const drape_point point = point_in_space(system, given);
-    drape_request want = {.point = &point,
-                          .hessian = true,
-                          .conservative = true,
-                          .dissipative = true,
-                          .positive_share = 1,
-                          .remainder = true};
-    const drape_sums to = into_values(system, values);
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, &point))
-        drape_contact_add_jacobian(system->contact, point.weight, DRAPE_CONTACT_GAUSS_NEWTON, 1,
-                                   system->pattern, values);
+    const drape_request want = {.point = &point,
+                                .hessian = true,
+                                .conservative = true,
+                                .dissipative = true,
+                                .positive_share = 1,
+                                .remainder = true};
+    add_jacobian(system, want, DRAPE_CONTACT_GAUSS_NEWTON, values);
 }
 
 bool drape_system_has_remainder(const drape_system *system)
@@ -715,12 +719,8 @@ bool drape_system_has_remainder(const drape_system *system)
 void drape_system_damping(drape_system *system, const drape_point *given, double *values)
 {
     const drape_point point = point_in_space(system, given);
-    drape_request want = {.point = &point, .hessian = true, .velocity = true, .dissipative = true};
-    const drape_sums to = into_values(system, values);
-    evaluate_wind(system, &want);
-    drape_summer_add(system->summer, &want, &to);
-    if (evaluate_contact(system, &point))
-        drape_contact_add_jacobian(system->contact, 0, DRAPE_CONTACT_VELOCITY, 0, system->pattern, values);
+    const drape_request want = {.point = &point, .hessian = true, .velocity = true, .dissipative = true};
+    add_jacobian(system, want, DRAPE_CONTACT_VELOCITY, values);
     drape_system_project_matrix(system, values);
 }
 
@@ -731,16 +731,21 @@ static bool has_energy(const drape_system *system, const drape_term *term)
     return !term->ops->law && !term->ops->dissipation && !drape_summer_leaves(system->summer, term);
 }
 
-void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
+static double energy_at(const drape_system *system, const drape_term *term, const drape_point *point)
 {
     const drape_request want = {.point = point, .energy = true, .conservative = true};
+    double energy = 0;
+    drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
+    return energy;
+}
+
+void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
+{
     *elastic = *gravity = 0;
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        double energy = 0;
         if (has_energy(system, term))
-            drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
-        *(term->ops->external ? gravity : elastic) += energy;
+            *(term->ops->external ? gravity : elastic) += energy_at(system, term, point);
     }
     *elastic = drape_ranks_sum(system->ranks, *elastic);
     *gravity = drape_ranks_sum(system->ranks, *gravity);
@@ -791,14 +796,10 @@ static double by_progress(drape_system *system, const drape_term *term, const dr
 {
     const double progress = drape_term_progress(term, at->t), back = fmin(PROGRESS_STEP, progress),
                  ahead = fmin(PROGRESS_STEP, 1 - progress);
-    double energy[2] = {0, 0};
-    for (int k = 0; k < 2; k++) {
-        drape_point point = *at;
-        point.progressed = k == 0 ? -back : ahead;
-        const drape_request want = {.point = &point, .energy = true, .conservative = true};
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
-    }
-    return (energy[1] - energy[0]) / (back + ahead);
+    drape_point less = *at, more = *at;
+    less.progressed = -back;
+    more.progressed = ahead;
+    return (energy_at(system, term, &more) - energy_at(system, term, &less)) / (back + ahead);
 }
 
 /* By the trapezoidal rule over the progress, at whose ends the nodes are where the step has them: between
@@ -813,13 +814,8 @@ static double timed_work(drape_system *system, const drape_term *term, const dra
     if (done < 1)
         return done * (by_progress(system, term, from) + by_progress(system, term, to)) / 2;
     drape_point after = *from;
-    double energy[2] = {0, 0};
     after.done = true;
-    for (int k = 0; k < 2; k++) {
-        const drape_request want = {.point = k ? &after : from, .energy = true, .conservative = true};
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
-    }
-    return energy[1] - energy[0];
+    return energy_at(system, term, &after) - energy_at(system, term, from);
 }
 
 /* E0 of a load without its history, and its rate dE0/dx . v. */
@@ -868,12 +864,11 @@ static double turning_work(drape_system *system, const drape_term *term, const d
                            const drape_point *to)
 {
     const double h = to->t - from->t, ahead[4] = {0, h, -h, 0};
-    double energy[4] = {0, 0, 0, 0};
+    double energy[4];
     for (int k = 0; k < 4; k++) {
         drape_point point = k < 2 ? *from : *to;
         point.ahead = ahead[k];
-        const drape_request want = {.point = &point, .energy = true, .conservative = true};
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy[k]);
+        energy[k] = energy_at(system, term, &point);
     }
     return (energy[1] - energy[0] + energy[3] - energy[2]) / 2;
 }

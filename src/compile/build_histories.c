@@ -52,8 +52,7 @@ static drape_status add(drape_model *model, const char *name, size_t count, cons
     to->time = drape_arena_take(arena, count, sizeof *to->time);
     to->value = drape_arena_take(arena, count, sizeof *to->value);
     to->slope = cubic ? drape_arena_take(arena, count, sizeof *to->slope) : NULL;
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     memcpy(to->time, times, count * sizeof *times);
     memcpy(to->value, values, count * sizeof *values);
     if (cubic)

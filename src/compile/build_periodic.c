@@ -260,8 +260,7 @@ static drape_status list_sets(drape_model *m, int32_t *parent)
     }
     m->image_start = drape_arena_take(&m->arena, (size_t)m->image_set_count + 1, sizeof *m->image_start);
     m->image = drape_arena_take(&m->arena, (size_t)members, sizeof *m->image);
-    if (drape_arena_status(&m->arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(&m->arena));
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->image_set[i] >= 0)
             m->image_start[m->image_set[i] + 1]++;

@@ -510,8 +510,7 @@ drape_status drape_compile_number_nodes(drape_model *model, const int32_t *track
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_node);
     model->moved_track =
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_track);
-    if (drape_arena_status(&model->arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(&model->arena));
     int32_t moved = 0;
     for (int32_t i = 0; i < model->node_count; i++) {
         if (model->free_of_node[i] >= 0)

@@ -39,8 +39,7 @@ static drape_status weigh(drape_model *model, const double *mass)
     const drape_cloth *from = model->cloths;
     model->mass = drape_arena_take(&model->arena, nodes, sizeof *model->mass);
     model->cloths = drape_arena_take(&model->arena, cloths, sizeof *model->cloths);
-    if (drape_arena_status(&model->arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(&model->arena));
     memcpy(model->mass, mass, nodes * sizeof *mass);
     drape_periodic_share(model, model->mass);
     for (size_t c = 0; c < cloths; c++) {

@@ -111,8 +111,7 @@ static drape_status gather(drape_model *model)
     model->triangle = drape_arena_take(arena, 3 * (size_t)model->triangle_count, sizeof *model->triangle);
     model->edge = drape_arena_take(arena, 2 * edges, sizeof *model->edge);
     model->edge_length = drape_arena_take(arena, edges, sizeof *model->edge_length);
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     for (int32_t c = 0; c < model->cloth_count; c++) {
         const drape_cloth *cloth = &model->cloths[c];
         const drape_mesh *mesh = &cloth->mesh;

@@ -32,8 +32,7 @@ drape_status drape_faces_allocate(drape_context *ctx, const drape_mesh_source *s
     f->uv = drape_arena_take(arena, uvs, 2 * sizeof *f->uv);
     f->material = drape_arena_take(arena, faces, sizeof *f->material);
     f->corner = drape_arena_take(arena, triangles, 3 * sizeof *f->corner);
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     f->count = (int32_t)faces;
     f->corner_count = (int32_t)corners;
     f->uv_count = (int32_t)uvs;
@@ -313,8 +312,7 @@ drape_status drape_faces_vertices(drape_arena *arena, const drape_mesh *mesh, dr
     *vertices = (drape_vertices){.node = drape_arena_take(arena, capacity, sizeof *vertices->node),
                                  .uv = drape_arena_take(arena, capacity, sizeof *vertices->uv),
                                  .at = drape_arena_take(arena, (size_t)corners, sizeof *vertices->at)};
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     if (f->uv_count == 0) {
         vertices->count = mesh->node_count;
         for (int32_t i = 0; i < mesh->node_count; i++) {

@@ -65,8 +65,7 @@ drape_status drape_mesh_measure(drape_mesh *mesh)
     mesh->triangle_area = drape_arena_take(arena, (size_t)mesh->triangle_count, sizeof *mesh->triangle_area);
     mesh->edge_length = drape_arena_take(arena, (size_t)mesh->edge_count, sizeof *mesh->edge_length);
     mesh->node_area = drape_arena_take(arena, (size_t)mesh->node_count, sizeof *mesh->node_area);
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         double area[3];

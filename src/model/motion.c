@@ -42,8 +42,7 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     for (int32_t i = 0; motion->deformation && i < model->collider_count; i++)
         if (drape_deformation_create(arena, &model->colliders[i].frames, &motion->deformation[i]))
             return DRAPE_E_MEMORY;
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
+    DRAPE_TRY(drape_arena_status(arena));
     motion->moved_count = model->moved_count;
     for (int32_t i = 0; i < model->node_count; i++)
         motion->place[i] = -1;

@@ -153,12 +153,9 @@ bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const dou
                       const double law[9], drape_midedge *out)
 {
     patch p = {.cloth = cloth, .out = out, .triangle = triangle};
-    const double *corner[3];
     double axes[6], flat[6];
     memset(out, 0, sizeof *out);
-    for (int k = 0; k < 3; k++)
-        corner[k] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)triangle + (size_t)k];
-    if (!drape_orthotropic_frame(values, corner, law, axes, flat))
+    if (!drape_orthotropic_frame(values, cloth, triangle, law, axes, flat))
         return false;
     drape_patch_around(cloth, triangle, flat, &p.around);
     memcpy(out->node, p.around.node, sizeof out->node);

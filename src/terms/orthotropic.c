@@ -43,14 +43,13 @@ static bool project(const double a[3], const double n[3], double out[3])
     return true;
 }
 
-bool drape_orthotropic_frame(const double *values, const double *const corner[3], const double c[9],
-                             double axes[6], double flat[6])
+bool drape_orthotropic_frame(const double *values, const drape_cloth_view *cloth, int32_t triangle,
+                             const double c[9], double axes[6], double flat[6])
 {
     const double *warp = values + DRAPE_ORTHOTROPIC_DIRECTION;
     const double x_axis[3] = {1, 0, 0};
     double a[3], b[3], n[3];
-    vec3_sub(corner[1], corner[0], a);
-    vec3_sub(corner[2], corner[0], b);
+    vec3_triangle_sides(cloth->triangle + 3 * (size_t)triangle, cloth->rest, a, b);
     vec3_cross(a, b, n);
     const double twice_area = vec3_norm(n);
     for (int i = 0; i < 3; i++)

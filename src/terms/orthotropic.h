@@ -29,8 +29,8 @@ void drape_orthotropic_law(const double *values, const drape_woven *measured, do
 /* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the projection of the
  * warp, and the corners in them (3 x 2), the first at 0. Returns false if the warp is normal to the plane,
  * unless the law is isotropic: then the first axis is along an edge. */
-bool drape_orthotropic_frame(const double *values, const double *const corner[3], const double c[9],
-                             double axes[6], double flat[6]);
+bool drape_orthotropic_frame(const double *values, const drape_cloth_view *cloth, int32_t triangle,
+                             const double c[9], double axes[6], double flat[6]);
 
 /* Reports that drape_orthotropic_frame returned false for a triangle. */
 drape_status drape_orthotropic_refuse(drape_term_builder *builder, int32_t triangle);

@@ -3,12 +3,17 @@
 
 #include "base/vec3.h"
 
-void drape_strain_law(const drape_cloth_view *cloth, const double *values, double c[9], double k[3],
-                      double l[9])
+drape_status drape_strain_begin(const drape_cloth_view *cloth, const double *values,
+                                drape_term_builder *builder, int rest_count, double c[9], double k[3],
+                                double l[9])
 {
+    if (cloth->triangle_count > INT32_MAX / 3)
+        return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
+                                 INT32_MAX / 3);
     drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
                           cloth->material->poisson_ratio, c);
     drape_orthotropic_squares(c, 3, k, l);
+    return drape_term_reserve(builder, 3 * cloth->triangle_count, rest_count);
 }
 
 void drape_strain_weights(const double l[3], const double flat[6], double w[3])

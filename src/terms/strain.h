@@ -18,9 +18,11 @@ enum { DRAPE_STRAIN_LIST = DRAPE_ORTHOTROPIC_DIRECTION + 1 }; /* the direction i
 /* The first rest data of an element. */
 enum { DRAPE_STRAIN_K, DRAPE_STRAIN_Q0, DRAPE_STRAIN_AREA, DRAPE_STRAIN_COUNT };
 
-/* The squares k (3), l (3 x 3) of the law C (3 x 3) of a cloth [N/m]. */
-void drape_strain_law(const drape_cloth_view *cloth, const double *values, double c[9], double k[3],
-                      double l[9]);
+/* Announces three elements per triangle, and finds the squares k (3), l (3 x 3) of the law C (3 x 3) of a
+ * cloth [N/m]. */
+drape_status drape_strain_begin(const drape_cloth_view *cloth, const double *values,
+                                drape_term_builder *builder, int rest_count, double c[9], double k[3],
+                                double l[9]);
 
 /* Weights with which l . e = 1/2 (w11 d1.d1 + w22 d2.d2) + w12 d1.d2 - q0 for a triangle with the sides d1 =
  * x1 - x0, d2 = x2 - x0, from its corners in its plane at rest, flat (3 x 2): w = (w11, w12, w22). */

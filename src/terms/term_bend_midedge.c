@@ -361,11 +361,8 @@ static drape_status hysteresis_of(const double *values, const double law[9], dra
 static bool has_warp(const drape_cloth_view *cloth, const double *values, int32_t triangle)
 {
     static const double woven[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}; /* any law that is not isotropic */
-    const double *corner[3];
     double axes[6], flat[6];
-    for (int a = 0; a < 3; a++)
-        corner[a] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)triangle + (size_t)a];
-    return drape_orthotropic_frame(values, corner, woven, axes, flat);
+    return drape_orthotropic_frame(values, cloth, triangle, woven, axes, flat);
 }
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

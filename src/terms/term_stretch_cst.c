@@ -116,20 +116,13 @@ static void tension_part(const double l[3], double plus[3])
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     double c[9], k[3], l[9];
-    if (cloth->triangle_count > INT32_MAX / 3)
-        return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
-                                 INT32_MAX / 3);
-    drape_strain_law(cloth, values, c, k, l);
-    DRAPE_TRY(drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT));
+    DRAPE_TRY(drape_strain_begin(cloth, values, builder, REST_COUNT, c, k, l));
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
-        const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
-                                         cloth->rest + 3 * (size_t)node[2]};
         double axes[6], flat[6], w[3], plus[3], tension[3], d1[3], d2[3];
-        if (!drape_orthotropic_frame(values, corner, c, axes, flat))
+        if (!drape_orthotropic_frame(values, cloth, t, c, axes, flat))
             return drape_orthotropic_refuse(builder, t);
-        vec3_sub(corner[1], corner[0], d1);
-        vec3_sub(corner[2], corner[0], d2);
+        vec3_triangle_sides(node, cloth->rest, d1, d2);
         for (int r = 0; r < 3; r++) {
             const double area = cloth->triangle_area[t];
             drape_strain_weights(l + 3 * r, flat, w);

@@ -113,11 +113,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     memcpy(direction + DRAPE_ORTHOTROPIC_DIRECTION, values + PARAM_DIRECTION, 3 * sizeof *direction);
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
-        const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
-                                         cloth->rest + 3 * (size_t)node[2]};
         const double area = cloth->triangle_area[t];
         double axes[6], flat[6];
-        if (!drape_orthotropic_frame(direction, corner, woven, axes, flat))
+        if (!drape_orthotropic_frame(direction, cloth, t, woven, axes, flat))
             return drape_orthotropic_refuse(builder, t);
         /* The gradients of N1 and N2: column k of F is sum B_n[k] (x_n - x0). */
         const double twice = flat[2] * flat[5] - flat[3] * flat[4];

@@ -347,20 +347,13 @@ static void set_square(drape_term_builder *builder, int32_t element, const int32
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     double c[9], k[3], l[9];
-    if (cloth->triangle_count > INT32_MAX / 3)
-        return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
-                                 INT32_MAX / 3);
-    drape_strain_law(cloth, values, c, k, l);
-    DRAPE_TRY(drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT));
+    DRAPE_TRY(drape_strain_begin(cloth, values, builder, REST_COUNT, c, k, l));
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
-        const double *corner[3];
         double axes[6], flat[6], w[NODES * NODES];
         int32_t node[NODES];
         drape_patch patch;
         fit f;
-        for (int a = 0; a < 3; a++)
-            corner[a] = cloth->rest + 3 * (size_t)cloth->triangle[3 * (size_t)t + (size_t)a];
-        if (!drape_orthotropic_frame(values, corner, c, axes, flat))
+        if (!drape_orthotropic_frame(values, cloth, t, c, axes, flat))
             return drape_orthotropic_refuse(builder, t);
         drape_patch_around(cloth, t, flat, &patch);
         fit_patch(&patch, &f);

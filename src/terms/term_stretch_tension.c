@@ -40,15 +40,13 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
                           cloth->material->poisson_ratio, c);
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
-        const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
-                                         cloth->rest + 3 * (size_t)node[2]};
         double axes[6], flat[6], x[9], p[3], q[3];
-        if (!drape_orthotropic_frame(values, corner, c, axes, flat))
+        if (!drape_orthotropic_frame(values, cloth, t, c, axes, flat))
             return drape_orthotropic_refuse(builder, t);
         const double twice = flat[2] * flat[5] - flat[3] * flat[4];
         double w[2][3] = {{0, flat[5] / twice, -flat[3] / twice}, {0, -flat[4] / twice, flat[2] / twice}};
-        for (int i = 0; i < 9; i++)
-            x[i] = corner[i / 3][i % 3];
+        for (int a = 0; a < 3; a++)
+            memcpy(x + 3 * a, cloth->rest + 3 * (size_t)node[a], 3 * sizeof *x);
         columns(w, x, p, q);
         drape_term_set(builder, t, node,
                        (const double[REST_COUNT]){[REST_AREA] = cloth->triangle_area[t],
