@@ -3,6 +3,7 @@
  * those of a pattern with one number ("walk_%04d.obj"), from 0 or 1 on to the last that exists; a single file
  * is one frame. The triangles are those of the first file, and the same in all.
  */
+#include "base/list.h"
 #include "mesh/contents.h"
 #include "mesh/sequence.h"
 
@@ -22,16 +23,11 @@ typedef struct name_list {
 
 static drape_status add_name(name_list *list, const char *name)
 {
-    if (list->count == list->capacity) {
-        const int32_t capacity = 2 * list->capacity + 64;
-        char **more = drape_arena_resize(list->arena, list->name, (size_t)capacity, sizeof *more);
-        if (!more)
-            return DRAPE_E_MEMORY;
-        list->name = more;
-        list->capacity = capacity;
-    }
-    list->name[list->count] = drape_arena_text(list->arena, name);
-    return list->name[list->count++] ? DRAPE_OK : DRAPE_E_MEMORY;
+    char *copy = drape_arena_text(list->arena, name);
+    return copy && drape_list_append(list->arena, &list->name, &list->count, &list->capacity, &copy,
+                                     sizeof copy)
+               ? DRAPE_OK
+               : DRAPE_E_MEMORY;
 }
 
 static int compare(const void *a, const void *b)
