@@ -16,14 +16,10 @@
 #define MAX_NAME    256
 #define COPY_SIZE   4096 /* bytes that are archived at once */
 
-/* The same for a file, by its whole name. */
 static drape_status fail(const drape_file *file, const char *deed, int error)
 {
-    char path[512];
-    if (!file->folder)
-        return drape_file_fail(file->ctx, deed, file->path, error);
-    snprintf(path, sizeof path, "%.300s/%.200s", drape_folder_path(file->folder), file->path);
-    return drape_file_fail(file->ctx, deed, path, error);
+    return file->folder ? drape_folder_fail(file->folder, deed, file->path, error)
+                        : drape_file_fail(file->ctx, deed, file->path, error);
 }
 
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
@@ -416,7 +412,6 @@ void drape_file_archive(drape_file *file, drape_archive *a)
 
 drape_status drape_file_reopen(drape_file *file)
 {
-    const char *folder = drape_folder_path(file->folder);
     const uint64_t expected = file->sum.sum;
     *file->part = 0;
     file->fd = drape_open_regular(drape_folder_descriptor(file->folder), file->path, O_RDWR | O_NOFOLLOW);
@@ -426,17 +421,15 @@ drape_status drape_file_reopen(drape_file *file)
     if (file->last.st_size < file->kept)
         return drape_fail(
             file->ctx, DRAPE_E_FILE,
-            "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint", folder,
-            file->path, (long long)file->last.st_size, (long long)file->kept);
+            "cannot continue \"%.300s/%.200s\": it has %lld bytes, and had %lld at the checkpoint",
+            drape_folder_path(file->folder), file->path, (long long)file->last.st_size,
+            (long long)file->kept);
     const int error = drape_disk_sum(file->fd, 0, file->kept, file->change, &file->sum);
     if (error)
         return fail(file, "continue", error);
     return file->sum.sum == expected
                ? DRAPE_OK
-               : drape_fail(file->ctx, DRAPE_E_PARSE,
-                            "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of "
-                            "the checkpoint",
-                            folder, file->path);
+               : drape_folder_damaged(file->folder, file->path, "its checksum is not that of the checkpoint");
 }
 
 drape_status drape_file_trim(drape_file *file)

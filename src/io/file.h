@@ -20,10 +20,6 @@
 #include "base/archive.h"
 #include "io/folder.h"
 
-#define DRAPE_FILE_PART    ".part"          /* suffix of temporary names */
-#define DRAPE_MAX_TABLE    ((off_t)1 << 32) /* [bytes] of a file with rows or lines that is read */
-#define DRAPE_FILE_CHANGES 3
-
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
     drape_context *ctx;
@@ -34,14 +30,13 @@ typedef struct drape_file {
     size_t used; /* bytes in the buffer */
     int fd;
     bool open;
-    bool durable;       /* finishing it waits until it is on the disk */
-    int error;          /* errno of the first failure since the last record; 0: none */
-    off_t size, kept;   /* bytes written; bytes of complete records */
-    drape_checksum sum; /* of the bytes written */
-    drape_disk_bytes
-        change[DRAPE_DISK_BYTES]; /* what later records overwrite; offset < 0: counted from the end */
-    struct stat last;             /* the file that was last published; st_ino 0: none */
-    struct drape_file *next;      /* growing file of the same run; NULL: there are no more */
+    bool durable;                              /* finishing it waits until it is on the disk */
+    int error;                                 /* errno of the first failure since the last record; 0: none */
+    off_t size, kept;                          /* bytes written; bytes of complete records */
+    drape_checksum sum;                        /* of the bytes written */
+    drape_disk_bytes change[DRAPE_DISK_BYTES]; /* what later records overwrite */
+    struct stat last;                          /* the file that was last published; st_ino 0: none */
+    struct drape_file *next;                   /* growing file of the same run; NULL: there are no more */
 } drape_file;
 
 /* Takes all memory for files that the user names, with paths of at most path_length bytes; or for the file of

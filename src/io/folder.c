@@ -34,7 +34,7 @@ struct drape_folder {
     size_t input_count;
 };
 
-static drape_status fail(const drape_folder *f, const char *deed, const char *name, int error)
+drape_status drape_folder_fail(const drape_folder *f, const char *deed, const char *name, int error)
 {
     char path[512];
     snprintf(path, sizeof path, "%.300s/%.200s", f->path, name);
@@ -84,7 +84,7 @@ static drape_status read_manifest(drape_folder *f)
         return DRAPE_OK;
     if (fd < 0)
         return errno == EINVAL ? refuse(f, DRAPE_MANIFEST_NAME, "it is not a regular file")
-                               : fail(f, "read", DRAPE_MANIFEST_NAME, errno);
+                               : drape_folder_fail(f, "read", DRAPE_MANIFEST_NAME, errno);
     snprintf(path, sizeof path, "%.480s/" DRAPE_MANIFEST_NAME, f->path);
     drape_status status = drape_file_take(f->ctx, fd, path, MAX_MANIFEST, &text, &size);
     json_decref(f->lines);
@@ -325,8 +325,9 @@ drape_status drape_folder_check(drape_folder *f, drape_folder_claim *writes, dra
 
 static drape_status unlink_one(drape_folder *f, const char *name)
 {
-    return unlinkat(f->fd, name, 0) && errno != ENOENT ? fail(f, "remove the old file", name, errno)
-                                                       : DRAPE_OK;
+    return unlinkat(f->fd, name, 0) && errno != ENOENT
+               ? drape_folder_fail(f, "remove the old file", name, errno)
+               : DRAPE_OK;
 }
 
 static drape_status remove_one(drape_folder *f, const char *name, const claims *c)
@@ -367,21 +368,26 @@ static drape_status remove_part(drape_folder *f, const char *name, const claims 
 
 /* ---- The manifest ---- */
 
-/* Each line is one write, since processes that share a folder add to one manifest. Of a line that did not
- * fit on the disk a piece may remain, which readers leave out; the next line begins after its end. */
+/* Each line is one write, since processes that share a folder add to one manifest. The piece of a line that
+ * does not fit on the disk is taken back, unless others may have written after it: then readers leave it out,
+ * and the next line begins after its end. */
 static drape_status add_line(drape_folder *f, const char *line, bool durable)
 {
     char text[LINE_SIZE + 2];
+    struct stat info;
     ssize_t n;
     const int length = snprintf(text, sizeof text, "%s%s\n", f->torn ? "\n" : "", line);
     do
         n = write(f->manifest, text, (size_t)length);
     while (n < 0 && errno == EINTR);
     int error = n == length ? 0 : n < 0 ? errno : EFBIG;
-    f->torn = error && (f->torn || n > 0);
+    if (error && n > 0)
+        f->torn = f->shared || fstat(f->manifest, &info) || ftruncate(f->manifest, info.st_size - n);
+    else if (!error)
+        f->torn = false;
     if (!error && durable && fdatasync(f->manifest) && errno != EINVAL)
         error = errno;
-    return error ? fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
+    return error ? drape_folder_fail(f, "write", DRAPE_MANIFEST_NAME, error) : DRAPE_OK;
 }
 
 /* The name as a string of JSON, as RFC 8259 in section 7 demands. first, second: size and checksum, or
@@ -411,7 +417,7 @@ drape_status drape_folder_note(drape_folder *f, const char *name, const drape_ch
     if (sum)
         return add_file(f, name, false, sum->size, sum->sum, durable);
     return find_birth(fd, birth) ? add_file(f, name, true, birth[0], birth[1], durable)
-                                 : fail(f, "write", name, errno);
+                                 : drape_folder_fail(f, "write", name, errno);
 }
 
 /* The lines of files that still exist, of any name. */
@@ -465,7 +471,7 @@ drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, con
     f->torn = f->torn && f->shared;
     f->manifest = openat(f->fd, name, f->shared ? flags : flags | O_EXCL, (mode_t)0666);
     if (f->manifest < 0)
-        return fail(f, "write", DRAPE_MANIFEST_NAME, errno);
+        return drape_folder_fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     snprintf(head, sizeof head, "{\"manifest\":1,\"drape\":\"%.100s\"}", drape_version());
     status = add_line(f, head, false);
     if (f->shared)
@@ -473,10 +479,10 @@ drape_status drape_folder_begin(drape_folder *f, drape_folder_claim *clears, con
     if (!status)
         status = add_known(f);
     if (!status && f->known && fdatasync(f->manifest) && errno != EINVAL) /* the old one is lost */
-        status = fail(f, "write", DRAPE_MANIFEST_NAME, errno);
+        status = drape_folder_fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     if (!status && (f->known ? renameat(f->fd, name, f->fd, DRAPE_MANIFEST_NAME)
                              : rename_new(f, name, DRAPE_MANIFEST_NAME)))
-        status = fail(f, "write", DRAPE_MANIFEST_NAME, errno);
+        status = drape_folder_fail(f, "write", DRAPE_MANIFEST_NAME, errno);
     if (status)
         unlinkat(f->fd, name, 0);
     return status;
@@ -489,10 +495,10 @@ drape_status drape_folder_publish(drape_folder *f, const char *part, const char 
     if (rename_new(f, part, name) == 0)
         return DRAPE_OK;
     if (errno != EEXIST)
-        return fail(f, "write", name, errno);
+        return drape_folder_fail(f, "write", name, errno);
     const bool same = fstatat(f->fd, name, &there, AT_SYMLINK_NOFOLLOW) == 0 && same_file(last, &there);
     if ((same || !why_not_ours(f, name, &there)) && !is_input(f, &there))
-        return renameat(f->fd, part, f->fd, name) ? fail(f, "write", name, errno) : DRAPE_OK;
+        return renameat(f->fd, part, f->fd, name) ? drape_folder_fail(f, "write", name, errno) : DRAPE_OK;
     return drape_fail(
         f->ctx, DRAPE_E_FILE,
         "cannot write \"%.300s/%.200s\": a file of that name has appeared that Drape did not write", f->path,
@@ -511,6 +517,12 @@ drape_status drape_folder_sync(drape_folder *f)
 
 /* ---- Resuming ---- */
 
+drape_status drape_folder_damaged(const drape_folder *f, const char *name, const char *how)
+{
+    return drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s", f->path,
+                      name, how);
+}
+
 drape_status drape_folder_verify(drape_folder *f, drape_folder_claim *needed, const void *user)
 {
     const char *name;
@@ -524,8 +536,7 @@ drape_status drape_folder_verify(drape_folder *f, drape_folder_claim *needed, co
                           : missing || grows            ? NULL
                                                         : why_not_ours(f, name, &info);
         if (why)
-            return drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s",
-                              f->path, name, why);
+            return drape_folder_damaged(f, name, why);
     }
     return DRAPE_OK;
 }

@@ -74,6 +74,11 @@ drape_status drape_folder_verify(drape_folder *folder, drape_folder_claim *neede
 
 /* ---- For io/file.c ---- */
 
+/* Set the message of a failure: `cannot DEED "FOLDER/NAME": strerror(error)`, as drape_file_fail does; or
+ * that a file cannot be continued because it is damaged, with DRAPE_E_PARSE. */
+drape_status drape_folder_fail(const drape_folder *folder, const char *deed, const char *name, int error);
+drape_status drape_folder_damaged(const drape_folder *folder, const char *name, const char *how);
+
 /* A temporary name with a random number. */
 void drape_folder_part(const drape_folder *folder, uint64_t number, char part[DRAPE_PART_SIZE]);
 

@@ -38,18 +38,18 @@ typedef struct drape_frame {
 
 /* The memory of one frame. */
 typedef struct drape_frames {
-    drape_frame frame, rotated;                        /* rotated: with z up, if that is wanted */
-    double *positions, *velocities, *strain, *density; /* as in the frame; rotated ones follow */
-    double *node_density,
-        *triangle_strain; /* of nodes and triangles of the model; NULL: no fields are wanted */
-    double *normals;      /* of the nodes of the model; NULL: there is no render mesh */
-    int32_t *triangle;    /* of the model, for each triangle of the surface */
+    drape_frame frame, rotated; /* rotated: with z up */
+    bool rotates;               /* the latter is wanted */
+    /* As in the frame; positions and velocities of the rotated one follow: */
+    double *positions, *velocities, *strain, *density;
     uint8_t *pinned;
+    /* Of the nodes and triangles of the model; NULL if no fields are wanted, and without render meshes: */
+    double *node_density, *triangle_strain, *normals;
+    int32_t *triangle;          /* of the model, for each triangle of the surface */
     drape_export_body *bodies;  /* (body_count) the colliders, if they are wanted */
-    drape_collider_pose *poses; /* rotated ones follow */
+    drape_collider_pose *poses; /* of them; those of the rotated frame follow */
     int32_t body_count;
     size_t points; /* number of positions of a frame */
-    bool rotates;
 } drape_frames;
 
 /* Takes the memory, and makes the surfaces of the colliders: an endless one, as a plane, is cut off at two

@@ -1243,6 +1243,32 @@ START_TEST(any_name_is_found_again)
 }
 END_TEST
 
+START_TEST(names_match_patterns)
+{
+    static const struct {
+        const char *pattern, *name;
+        int64_t number; /* -1: the name is not of the pattern */
+    } cases[] = {{"frame_######.obj", "frame_000012.obj", 12},
+                 {"frame_######.obj", "frame_1234567.obj", 1234567},
+                 {"frame_######.obj", "frame_00012.obj", -1},
+                 {"frame_######.obj", "frame_000012.obj.bak", -1},
+                 {"frame_######.obj", "my_frame_000012.obj", -1},
+                 {"frame_######.obj", "frame_", -1},
+                 {"collider_#_######.vtp", "collider_3_000004.vtp", 4},
+                 {"collider_#.vtp", "collider_3_000004.vtp", -1},
+                 {"scene.json", "scene.json", 0},
+                 {"scene.json", "scene.jso", -1},
+                 {"scene_mesh_*", "scene_mesh_", 0},
+                 {"scene_mesh_*", "scene_mesh", -1}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        int64_t number = 0;
+        const bool found = drape_folder_matches(cases[i].pattern, cases[i].name, &number);
+        ck_assert_msg(found == (cases[i].number >= 0), "%s: %s", cases[i].pattern, cases[i].name);
+        ck_assert(!found || number == cases[i].number);
+    }
+}
+END_TEST
+
 SUITE("io", npy_is_exact, the_last_frame_comes_once, obj_parses_back, ply_parses_back,
       every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
       energies_are_of_the_state_at_or_after_the_frame, steps_has_a_row_for_each_attempt,
@@ -1251,4 +1277,4 @@ SUITE("io", npy_is_exact, the_last_frame_comes_once, obj_parses_back, ply_parses
       full_disk_leaves_a_valid_collection, a_disk_full_from_the_start_is_reported_at_once,
       bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made, each_allocation_may_fail,
       summary_is_complete, summary_is_always_json, summary_fails_whole, numbers_do_not_follow_the_locale,
-      any_name_is_found_again)
+      any_name_is_found_again, names_match_patterns)
