@@ -8,6 +8,7 @@ import csv
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import struct
@@ -120,6 +121,12 @@ def stopped(*args, **how):
             child.kill()
 
 
+def catches(pid):
+    """Whether a process catches SIGHUP, the last signal for which the program installs its handler."""
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        return int(re.search(r"^SigCgt:\s*(\w+)", file.read(), re.M).group(1), 16) >> (signal.SIGHUP - 1) & 1
+
+
 def wait_for(condition, child):
     """Waits until a condition holds, which it must while the process still runs."""
     end = time.monotonic() + LIMIT
@@ -169,13 +176,28 @@ def claim(folder, name):
         file.write(json.dumps({"file": name, "size": len(data), "checksum": f"{total & mask:016x}"}) + "\n")
 
 
+def long(test):
+    """A test that takes seconds and compares numbers of what other tests run, too: only the suite long, which sets DRAPE_ALL, has it."""
+    test.long = True
+    return test
+
+
+def computed():
+    """CPU time [s] of all processes so far that have ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def run_tests(module):
-    only = os.environ.get("ONLY", "")
+    only, everything = os.environ.get("ONLY", ""), os.environ.get("DRAPE_ALL")
     tests = [test for name, test in module.items() if name.startswith("test_") and re.search(only, name)]
+    marked = [test for test in tests if hasattr(test, "long")]
+    if marked:
+        tests = marked if everything else [test for test in tests if test not in marked]
     print(f"1..{len(tests)}", flush=True)
     failed = 0
     for number, test in enumerate(tests, 1):
-        words = f"{number} - {test.__doc__}"
+        words, begun = f"{number} - {test.__doc__}", computed()
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             os.chdir(folder)
             try:
@@ -188,5 +210,6 @@ def run_tests(module):
                 print("not ok", words, flush=True)
                 print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
             os.chdir("/")
+        print(f"# {computed() - begun:.1f} s of CPU", flush=True)
     return failed > 0
 

@@ -15,7 +15,7 @@ import struct
 import subprocess
 import termios
 
-from program import (LIMIT, PROGRAM, Skip, calls_of, drape, equal, good, meddled, read_json, read_npy, read_steps, refused, run_tests, signalled, wait_for,
+from program import (LIMIT, PROGRAM, Skip, calls_of, catches, drape, equal, good, meddled, read_json, read_npy, read_steps, refused, run_tests, signalled, wait_for,
                      without_warnings, write_scene)
 
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -32,12 +32,6 @@ def status(pid):
     """The fields of /proc/pid/stat from the state on."""
     with open(f"/proc/{pid}/stat", encoding="utf-8") as file:
         return file.read().rsplit(")", 1)[1].split()
-
-
-def catches(pid):
-    """Whether a process catches SIGHUP, the last signal for which the program installs its handler."""
-    with open(f"/proc/{pid}/status", encoding="ascii") as file:
-        return int(re.search(r"^SigCgt:\s*(\w+)", file.read(), re.M).group(1), 16) >> (signal.SIGHUP - 1) & 1
 
 
 def waits(pid):
@@ -97,7 +91,7 @@ def strike(*args, out=None, moments=4, last=0.9):
         result = meddled(*args, signal=int(one), call=call)
         assert result.returncode == 130 and re.fullmatch(r"[^\n]*interrupted[^\n]*\n", without_warnings(result.stderr)), f"{what}: {result}"
         check_files(".", what)
-    print(f"# {args[0]}: {moments} of {moments} cut, the first {int(last * count)} of {count} calls")
+    print(f"# {args[0]}: {moments} of {moments} cut, in the first {int(last * count)} of {count} calls")
 
 
 def test_run():
