@@ -176,12 +176,6 @@ def claim(folder, name):
         file.write(json.dumps({"file": name, "size": len(data), "checksum": f"{total & mask:016x}"}) + "\n")
 
 
-def long(test):
-    """A test that takes seconds and compares numbers of what other tests run, too: only the suite long, which sets DRAPE_ALL, has it."""
-    test.long = True
-    return test
-
-
 def computed():
     """CPU time [s] of all processes so far that have ended."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -189,11 +183,8 @@ def computed():
 
 
 def run_tests(module):
-    only, everything = os.environ.get("ONLY", ""), os.environ.get("DRAPE_ALL")
+    only = os.environ.get("ONLY", "")
     tests = [test for name, test in module.items() if name.startswith("test_") and re.search(only, name)]
-    marked = [test for test in tests if hasattr(test, "long")]
-    if marked:
-        tests = marked if everything else [test for test in tests if test not in marked]
     print(f"1..{len(tests)}", flush=True)
     failed = 0
     for number, test in enumerate(tests, 1):

@@ -84,8 +84,8 @@ static const soak cases[] = {
                            "'self_contact': {'thickness': 3e-3, 'friction': 0.2}, "
                            "'contact': {'friction': 'lagged'},"
                            "'integrator': {'dt': 0.016666666666666666}, 'duration': 1}",
-     .mark = 20,
-     .warm = 90,
+     .mark = 10,
+     .warm = 48, /* two periods */
      .pins = {0, 11},
      .sway = {0.1, 0, 0.05},
      .collider = {0, 0.04, 0.1}},
