@@ -554,8 +554,7 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         return DRAPE_OK;
     }
     if (!status && (s->error_within || s->stopping.ended_by_error)) {
-        report->reason =
-            s->error_within ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR;
+        report->reason = s->error_within ? DRAPE_REASON_CORRECTION : DRAPE_REASON_LOCAL_ERROR;
         report->tolerance = NAN; /* the residual has none */
         report->by_error = !s->error_within;
         return DRAPE_OK;
