@@ -79,7 +79,7 @@ def remove(path):
         shutil.rmtree(path)
 
 
-def strike(*args, out=None, moments=4, last=0.9):
+def strike(*args, out=None, moments=4, last=0.8):
     """Signals the verb as soon as it catches signals, and at random calls. Each time it is interrupted: after the share `last` of its calls it may
     have results, and complete."""
     remove(out)
