@@ -137,7 +137,7 @@ def test_static():
     equal((summary["status"], summary["steps"]["accepted"]), ("e_stopped", 0))
     with open("count", encoding="ascii") as file:
         made = int(file.read().split()[1])
-    assert made < 0.7 * count, (made, count)
+    assert made < 0.9 * count, (made, count)  # a step that went on to its end would make all of them
 
 
 def test_long_step():
