@@ -1359,7 +1359,7 @@ typedef struct drape_diagnostic {
 typedef struct drape_attempt {
     int64_t index;       /* number of the attempt, from 0 */
     double t, h;         /* start and size [s] */
-    drape_status status; /* > 0 with accepted: on_failure "accept" accepted an unconverged state */
+    drape_status status; /* > 0 with accepted: an unconverged state was accepted (on_failure), or held */
     const char *reason;  /* "converged", "max_iterations" ...: a short static token */
     bool accepted;       /* the sim continued from its end; otherwise the step was rolled back */
     int iterations;      /* Newton iterations */

@@ -31,7 +31,7 @@ struct drape_system {
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
     const bool *left_out;         /* (term_count) terms without slots in it; NULL: none */
     drape_status status;          /* of drape_system_status */
-    const char *own_reasons[DRAPE_OWN_REASONS]; /* of user-defined terms: static texts */
+    const char *own_reasons[DRAPE_OWN_REASONS]; /* of user-defined terms */
     int own_reason_count;
     drape_motion *motion;
     drape_drag_springs drag;
@@ -1038,8 +1038,8 @@ drape_reason drape_system_reason(drape_system *s, const char *name)
         i++;
     if (i == DRAPE_OWN_REASONS)
         return DRAPE_REASON_OTHER;
-    if (i == s->own_reason_count)
-        s->own_reasons[s->own_reason_count++] = name;
+    s->own_reason_count = i == s->own_reason_count ? i + 1 : s->own_reason_count;
+    s->own_reasons[i] = name; /* the text of a term, which is static, in the place of one that was copied */
     return (drape_reason)(DRAPE_REASON_COUNT + i);
 }
 

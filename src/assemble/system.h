@@ -87,8 +87,8 @@ void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
 /* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
- * internal variables of the former. *open grows by how much that may be off if histories change at another
- * time of the step than an integrator sees: at its end, for some. *dissipated grows by what of the work is
+ * internal variables of the former. *open grows by the possible error of that work: a history may change
+ * within the step, of which some integrators see only the end. *dissipated grows by what of the work is
  * done on dashpots; NULL: nothing moves them. */
 bool drape_system_is_timed(const drape_system *system);
 double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
@@ -291,8 +291,8 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
 
 #define DRAPE_OWN_REASONS 31 /* of user-defined terms; any more are DRAPE_REASON_OTHER */
 
-/* The number of a reason by its name, static text, which may be that of a user-defined term; and the name of
- * a reason by its number. */
+/* The number of a reason by its name, which may be that of a user-defined term, and stays valid; and the name
+ * of a reason by its number. */
 drape_reason drape_system_reason(drape_system *system, const char *name);
 const char *drape_system_reason_name(const drape_system *system, drape_reason reason);
 

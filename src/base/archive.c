@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FORMAT     2
+#define FORMAT     3
 #define OLD_FORMAT 1               /* its checksum was another one */
 #define MAGIC      "DRAPE\r\n\x1a" /* its line ends make text-mode transfers break it at once */
 #define MAGIC_SIZE 8

@@ -23,7 +23,7 @@
     X(HELD, "held", "time budget",                                                                           \
       "accepted: the step failed again and again, and the cloth was held where it was, or went with its "    \
       "pins")                                                                                                \
-    X(RESIDUAL, "residual", "Newton, newton_k", "the residual is too large after all iterations")            \
+    X(RESIDUAL, "residual", "Newton, newton_k, the sim", "the residual is too large after all iterations")   \
     X(STAGNATION, "stagnation", "KINSOL",                                                                    \
       "corrections became too small to change the state, short of the tolerance")                            \
     X(MAX_ITERATIONS, "max_iterations", "KINSOL", "not converged after `max_iterations`")                    \

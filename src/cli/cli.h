@@ -177,7 +177,7 @@ typedef struct cli_scene {
     drape_context *ctx;
     drape_scene *scene;
     drape_model *model;
-    drape_model *whole; /* of which the model is the part of one rank (cli/ranks.h); NULL: it is whole */
+    drape_model *whole; /* of which the model is the part of one rank (cli/cli_ranks.h); NULL: it is whole */
     drape_sim *sim;
 } cli_scene;
 

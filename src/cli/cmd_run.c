@@ -1,6 +1,6 @@
 /* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
 #include "cli/cli.h"
-#include "cli/ranks.h"
+#include "cli/cli_ranks.h"
 
 #include "base/clock.h"
 #include "base/hash.h"

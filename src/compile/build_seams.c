@@ -144,6 +144,7 @@ drape_status drape_compile_seams(drape_model *model, const drape_scene_def *def)
     for (size_t i = 0; i < def->seam_count; i++) {
         DRAPE_TRY(drape_check_cancel(model->ctx));
         DRAPE_TRY(compile_seam(model, i, &def->seams[i]));
+        drape_arena_free(&model->scratch); /* there may be thousands of seams of large sheets */
         model->seam_count = (int32_t)i + 1;
     }
     return DRAPE_OK;

@@ -29,7 +29,7 @@ typedef struct drape_inside_pairs {
     int32_t count, capacity;
 } drape_inside_pairs;
 
-/* Removes the pairs that are not among the near ones, at whose gaps both barriers are equal, and adds the
+/* Removes the pairs that are near no more, where both barriers are equal and no force jumps, and adds the
  * near pairs that are below their least gap. Returns whether a pair was added; *status: DRAPE_E_MEMORY. */
 bool drape_inside_update(drape_inside_pairs *inside, const drape_near_pair *near, int32_t count,
                          double rounding, drape_status *status);
@@ -58,8 +58,8 @@ typedef struct drape_active_set {
 } drape_active_set;
 
 /* Lists the active contacts, and the near pairs that are not exempt, of a configuration at these distances
- * from the paths of the candidates. inside: the pairs that are inside. all_inside: so is every other pair
- * below its least gap, as outside of steps, where nothing but a placed state can be there. Errors:
+ * from the paths of the candidates. inside: the pairs that are inside. all_inside, for queries between
+ * steps: every pair below its least gap is, too. Errors:
  * DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates,
                                    const drape_distances *away, const drape_configuration *at,

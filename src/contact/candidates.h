@@ -1,7 +1,7 @@
 /*
  * candidates.h: the candidate pairs, found by the broad phase along a straight path of all points. They are
- * valid for a configuration if there is a step fraction of the path, the same for all points, at which no
- * point is farther than the margin from its place in the configuration. The rank of pairs depends on the
+ * valid for a configuration if at some moment of the path, the same for all points, every point is within the
+ * margin of its place in the configuration. The rank of pairs depends on the
  * pieces alone: sums over the active pairs, in this order, have the same bits wherever searches were made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H

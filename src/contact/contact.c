@@ -24,7 +24,9 @@
  *     contact.c          creation, and the beginning of a step
  *     contact_archive.c  checkpoints
  *
- * So a pair gets to the Jacobian by broad_phase.c, candidates.c, pair.c, active.c and law.c.
+ * So a pair gets to the Jacobian: evaluation.c asks candidates.c for the pairs near the path, of which those
+ * of features come from broad_phase.c; active.c keeps the pairs whose gap, by pair.c, is below the activation
+ * distance; jacobian.c adds the blocks of law.c, restitution.c and friction.c.
  */
 #include "contact/contact_parts.h"
 
@@ -36,9 +38,9 @@
 #include <string.h>
 
 #define MARGIN 0.06 /* by which points may leave the path of a search before a new one, in mean edges */
-/* The stiffness is raised when the smallest gap is small and has shrunk since the last raise, and in every
- * attempt that begins where a gap is almost the least one. It falls when the smallest gap is large again.
- * Gaps in activation distances. */
+/* The stiffness is raised at the first attempt of a step, if the smallest gap is below SMALL_GAP and less
+ * than 1/RAISE of what it was at the last raise, and at every attempt, if a gap is below RAISE least gaps. It
+ * falls while the smallest gap is above LARGE_GAP. Gaps are in activation distances. */
 #define SMALL_GAP  0.05
 #define LARGE_GAP  0.3
 #define RAISE      2.0 /* factor of the stiffness, and how many times smaller the gap must be for the next */
@@ -354,8 +356,8 @@ static drape_status agree(const drape_contact *c, drape_status status)
 
 /* Between steps the laws of contacts change: which cloth is exempt and how hard it is pushed, activation
  * distances, which pairs are inside, the stiffness. What these changes add to the energy of the present
- * contacts, or take from it, is work done from outside (drape_contact_take_work). That energy is the one
- * between steps, in which cloth that was placed into a body is inside, and has not passed the barrier. */
+ * contacts, or take from it, is work done from outside (drape_contact_take_work). The energy before the
+ * change follows the rule between steps: cloth that was placed into a body counts as inside. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds();

@@ -82,8 +82,8 @@ double drape_contact_take_work(drape_contact *contact);
 /* Which derivatives of pairs of free nodes are added. */
 typedef enum drape_contact_derivatives {
     DRAPE_CONTACT_EXACT,       /* dg/dx + weight dg/dv */
-    DRAPE_CONTACT_SYMMETRIC,   /* the same; in models where no friction is implicit, its symmetric part, which
-                               differs from it only by restitution */
+    DRAPE_CONTACT_SYMMETRIC,   /* without implicit friction, the symmetric part of the exact ones, which
+                               differs from them only by restitution; with it, the exact ones */
     DRAPE_CONTACT_VELOCITY,    /* dg/dv */
     DRAPE_CONTACT_GAUSS_NEWTON /* a positive semidefinite approximation: the Gauss-Newton part of the Hessians
                                   of the energy (contact/law.h), and symmetric upper bounds of the weight
@@ -91,8 +91,8 @@ typedef enum drape_contact_derivatives {
                                   contact/friction.h) */
 } drape_contact_derivatives;
 
-/* Adds them to values in the pattern, which must have their blocks: with the share `positive_share`, from 0
- * to 1, of the difference between them and DRAPE_CONTACT_GAUSS_NEWTON. */
+/* Adds (1 - s) times these derivatives and s times DRAPE_CONTACT_GAUSS_NEWTON, s = positive_share in [0, 1],
+ * to values in the pattern, which must have their blocks. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, drape_contact_derivatives which,
                                 double positive_share, const drape_pattern *pattern, double *values);
 
@@ -143,9 +143,10 @@ void drape_contact_archive_stiffness(drape_contact *contact, drape_archive *a);
  * a margin; colliders rest in their poses at time t. of_node (node_count), unless NULL, is lowered at each
  * node to the smallest fraction of its pairs. If some node goes farther than a few edges, pairs are not
  * searched: such nodes are shortened to that length, or to about an edge if the displacement throws nodes
- * farther than the scene is large. again: y is what the last call from x has left of the displacement, and
- * of_node its result, which is replaced by the fractions of y; pairs whose nodes that call did not shorten
- * are known to limit nothing. If the watched flag is raised meanwhile, the result is 0, also at each node. */
+ * farther than the scene is large. again: this is a second call from the same x, with the displacement that
+ * the first result has left; of_node still has that result, and is replaced. Pairs of nodes that the first
+ * call did not shorten limit nothing, and are skipped. If the watched flag is raised meanwhile, the result is
+ * 0, also at each node. */
 double drape_contact_step_fraction(drape_contact *contact, const double *x, const double *y, double t,
                                    bool again, double *of_node);
 

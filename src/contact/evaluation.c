@@ -188,8 +188,8 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
     drape_distances away;
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (!candidates) {
-        /* In a step the path of the search begins where the step begins, or the one before it, because the
-         * check at the end of the step needs the pairs on that path. */
+        /* In a step the search covers the path from c->start, where this step begins, because the check at
+         * its end needs the pairs on that path. */
         drape_straight_path path = here;
         if (in_step && is_near_start(c, at->x))
             path.end[0] = (drape_configuration){.model = c->model, .x = c->start, .pose = c->start_pose};

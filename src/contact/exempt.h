@@ -13,7 +13,7 @@ typedef struct drape_exempt {
     int32_t count; /* exempt nodes of the cloth; 0: all pairs are held, and no function is called */
     /* The factor of the pressure on a pair; 0: it is held. */
     double (*factor)(const struct drape_exempt *exempt, const drape_pair *pair);
-    /* Whether an exempt pair is a contact itself; if not, `add` has the contacts of its nodes. */
+    /* Whether an exempt pair is pushed apart; if not, `add` makes contacts of its nodes with the surface. */
     bool (*acts)(const struct drape_exempt *exempt, const drape_pair *pair);
     /* Whether any of these nodes is exempt at a collider; -1 stands for no node. */
     bool (*has)(const struct drape_exempt *exempt, int32_t collider, const int32_t *node, int nodes);

@@ -47,8 +47,8 @@ static double tangent_stiffness(const drape_gap *gap, const drape_contact_law *l
                  : barrier * (1 - normal.share) + weight * normal.lambda * normal.slope;
 }
 
-/* The normal stiffness that a contact has in the Jacobian, the secant of its predicted force, less the
- * tangent. */
+/* By how much the normal stiffness of a contact in the Jacobian, the secant to its predicted force, is above
+ * the tangent stiffness; 0 without a prediction. */
 static double excess_stiffness(const drape_contact *c, const drape_active_contact *contact,
                                const drape_contact_law *law, double weight, bool bound)
 {
@@ -346,8 +346,8 @@ void drape_contact_predict(drape_contact *c, const double *p, double weight, dou
 
 /* ---- The pattern ---- */
 
-/* The blocks of contacts with colliders, the diagonal and the edges of triangles of the cloth, are in every
- * pattern: see drape_model_couplings. */
+/* A contact with a collider needs only blocks on the diagonal and of edges of the cloth, which every pattern
+ * has: see drape_model_couplings. */
 static bool has_blocks(const drape_contact *c, const drape_active_contact *contact,
                        const drape_pattern *pattern)
 {
@@ -409,10 +409,10 @@ int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
     const drape_straight_path here = {{now, now}};
     drape_distances away;
     c->coupling_count = 0;
-    /* A pattern has the blocks of all pairs within half of the distance up to which pairs are candidates.
-     * Blocks of more pairs would stay 0, and cost more in each factorisation of a pile than the patterns that
-     * they save. The pairs are taken from the candidates only if these contain all of them: a pattern depends
-     * on the positions alone. */
+    /* A pattern has the blocks of all pairs whose gap is below their activation distance and half of the
+     * margin. Blocks of more pairs would stay 0, and cost more in each factorisation of a pile than the
+     * patterns that they save. The pairs are taken from the candidates only if these contain all of them: a
+     * pattern depends on the positions alone. */
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
     if (candidates && away.largest + 0.5 * list.margin <= candidates->margin) {
         int32_t next = 0;

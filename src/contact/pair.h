@@ -38,19 +38,20 @@ static inline double drape_pair_least_gap(const drape_pair *pair, double roundin
 }
 
 /* A gap below this share of the rounding has no side that it could be kept on. The share is far below that of
- * the least gap which is kept on paths: only pairs that begin so near have no side, not those that steps have
- * accepted, even if the rounding has become larger since. */
+ * the least gap which is kept on paths: no step ends so near, even if the rounding has become larger since;
+ * only where a run starts can there be such pairs. */
 #define DRAPE_NO_SIDE 0.1
 static inline bool drape_gap_has_side(double gap, double rounding)
 {
     return gap >= DRAPE_NO_SIDE * rounding && gap > 0;
 }
 
-/* One half is the share of the least gap, or of a smaller one at the beginning of a step, that a path must
- * keep. When a Newton iterate is cut short, it is also the share that is kept of what a gap has above the
- * least one, and the share of the activation distance at which a pair that comes from beyond it is stopped:
- * halved from afar, the gap would reach the barrier only after many iterations, in which the pair holds up
- * all others. */
+/* The share that is kept
+ * - of the least gap, or of a smaller one at the beginning of a step, on every path;
+ * - of what a gap has above the least one, where a Newton iterate is cut short;
+ * - of the activation distance, where a pair that comes from beyond it is stopped: a gap that is halved from
+ *   afar would reach the barrier only after many iterations, in which this pair cuts the steps of all
+ *   others. */
 #define DRAPE_KEPT_GAP 0.5
 
 /* Each advance along a path (conservative advancement) is this share of the length that is certainly free,

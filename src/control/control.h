@@ -3,7 +3,8 @@
  * drape_controller_<name> of control_<name>.c. Its verdict is the first; others may change it (sim/step.c):
  *
  *     controller --ACCEPT------> events --ACCEPT--------------> the step is taken
- *         |                        |------REPEAT--------------> again, to end at a root
+ *         |                        |------REPEAT--------------> again, to end at a root, or after the actions
+ *         |                        |                            of a root at the present state
  *         |                        '------STOP
  *         '------RETRY, STOP---> rescue --RETRY--> schedule --> again, with a smaller step
  *                                  |      STOP <------'           (STOP if none is left)
@@ -17,9 +18,9 @@
 
 typedef enum drape_verdict {
     DRAPE_ACCEPT,
-    DRAPE_RETRY,     /* roll back and try again with a step of h_next */
-    DRAPE_STOP,      /* roll back and end the advance; `stop` says why */
-    DRAPE_REPEAT,    /* roll back and try again: who says so has changed the schedule, or the equations */
+    DRAPE_RETRY,  /* roll back and try again with a step of h_next */
+    DRAPE_STOP,   /* roll back and end the advance; `stop` says why */
+    DRAPE_REPEAT, /* roll back; the schedule (events) or the equations (rescue) of the next attempt differ */
     DRAPE_SUBSTITUTE /* take the step that a rescue has put in the place of the attempt (sim/rescue.h) */
 } drape_verdict;
 

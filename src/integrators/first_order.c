@@ -123,8 +123,10 @@ int drape_first_order_jacobian(drape_first_order *s, double t, double cj, const 
     point.weight = cj;
     point.contact = s->newton.bounds ? DRAPE_CONTACT_GAUSS_NEWTON : DRAPE_CONTACT_EXACT;
     s->failure = drape_system_matrix_follow(s->linear, &point);
-    if (s->failure)
+    if (s->failure) {
+        s->factored_cj = 0;
         return -1;
+    }
     drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
     if (!s->newton.bounds)
         s->symmetric = choose_symmetric(s);
@@ -550,7 +552,7 @@ static void archive_factors(drape_first_order *s, drape_archive *a)
     if (a->reading && !(s->exact_span >= 1 && s->exact_span <= MAX_EXACT_SPAN && s->exact_remaining >= 0 &&
                         s->exact_remaining <= s->exact_span))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an impossible number of exact matrices");
-    if (damping_of(s) && drape_archive_good(a))
+    if (s->factored_cj != 0 && damping_of(s) && drape_archive_good(a))
         drape_archive_doubles(a, damping_of(s), (size_t)s->linear->pattern->nonzeros);
     drape_system_matrix_archive(s->linear, a, s->factored_cj != 0);
 }

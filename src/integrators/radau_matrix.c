@@ -276,6 +276,11 @@ void drape_radau_matrix_archive(drape_radau_matrix *m, drape_archive *a)
     if (!drape_archive_good(a))
         return;
     for (int k = 0; k < m->linear->more_count; k++)
+        if (!m->linear->more[k]) /* memory was out in the last attempt */
+            drape_archive_note(a, DRAPE_E_MEMORY);
+    if (!drape_archive_good(a))
+        return;
+    for (int k = 0; k < m->linear->more_count; k++)
         drape_archive_doubles(a, m->linear->more[k], (size_t)m->linear->pattern->nonzeros);
     drape_system_matrix_archive(m->linear, a, m->h > 0);
 }

@@ -6,7 +6,7 @@
 #define DRAPE_IO_CSV_H
 
 #include "io/file.h"
-#include "sim/events.h"
+#include "sim/event_set.h"
 
 void drape_csv_put_integer(drape_file *file, int64_t value);
 /* With 17 digits, in the locale of the thread. */

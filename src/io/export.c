@@ -40,6 +40,7 @@ drape_status drape_export_open(const drape_export_def *def, const char *name, dr
                                        : drape_export_begin(def->ctx, def->folder, name, file);
     if (!status && def->resumes)
         drape_file_name(file, "%s", name);
+    file->durable = def->durable;
     while (*last)
         last = &(*last)->next;
     *last = file;

@@ -729,6 +729,8 @@ static drape_status glb_write(const drape_export_def *def, void *state, const dr
     for (int part = 0; part < 2 && first; part++)
         memcpy(glb->base[part], glb->moved[part], 3 * (size_t)glb->points * sizeof **glb->base);
     const drape_status status = first ? drape_file_publish(&glb->file) : drape_file_keep(&glb->file);
+    if (status && !first)
+        fill_lengths(glb, glb->frames); /* of the file as it was cut */
     glb->frames += !status;
     return status;
 }

@@ -286,7 +286,7 @@ void drape_file_overwrite_word(drape_file *file, off_t offset, uint32_t word)
 void drape_file_declare(drape_file *file, int64_t offset, size_t size)
 {
     drape_disk_bytes *c = file->change;
-    while (c->size > 0)
+    while (c < file->change + DRAPE_DISK_BYTES && c->size > 0)
         c++;
     assert(c < file->change + DRAPE_DISK_BYTES);
     *c = (drape_disk_bytes){.offset = offset, .size = (int64_t)size};
@@ -448,7 +448,9 @@ drape_status drape_file_close(drape_file *file)
     if (!file->open)
         return DRAPE_OK;
     const bool published = !*file->part && file->folder;
-    int error = close_descriptor(file);
+    int error = file->durable ? drape_disk_sync(file->fd) : 0;
+    const int closing = close_descriptor(file);
+    error = error ? error : closing;
     drop(file);
     if (error)
         return fail(file, "close", error);

@@ -517,6 +517,11 @@ drape_status drape_folder_sync(drape_folder *f)
 
 /* ---- Resuming ---- */
 
+bool drape_folder_wrote(const drape_folder *f, const char *name)
+{
+    return json_object_get(f->lines, name) != NULL;
+}
+
 drape_status drape_folder_damaged(const drape_folder *f, const char *name, const char *how)
 {
     return drape_fail(f->ctx, DRAPE_E_PARSE, "cannot continue \"%.300s/%.200s\": it is damaged: %s", f->path,

@@ -72,6 +72,9 @@ drape_status drape_folder_remove(drape_folder *folder, drape_folder_claim *claim
  * known elsewhere. A file that is missing is a fault if `needed` claims it. Errors: DRAPE_E_PARSE. */
 drape_status drape_folder_verify(drape_folder *folder, drape_folder_claim *needed, const void *user);
 
+/* Whether the manifest has a file of this name. */
+bool drape_folder_wrote(const drape_folder *folder, const char *name);
+
 /* ---- For io/file.c ---- */
 
 /* Set the message of a failure: `cannot DEED "FOLDER/NAME": strerror(error)`, as drape_file_fail does; or

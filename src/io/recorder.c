@@ -126,7 +126,9 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
     f->frame.index = r->progress.frames;
     f->frame.time = time;
     f->frame.nodes = positions;
-    drape_frames_make(f, drape_model_whole(r->sim->model), drape_system_motion(r->sim->system), velocities);
+    if (!r->ranks || r->gathers) /* else no format needs the frame of the whole model here */
+        drape_frames_make(f, drape_model_whole(r->sim->model), drape_system_motion(r->sim->system),
+                          velocities);
     for (size_t i = 0; i < r->output_count && !r->failure; i++) {
         const output *o = &r->outputs[i];
         if (!is_shared(r, o))
@@ -466,6 +468,22 @@ static drape_status begin_files(drape_recorder *r)
     return status ? status : open_files(r);
 }
 
+/* A frame that the checkpoint counts must be in the manifest, which may be lost or torn itself. */
+static drape_status find_frames(const drape_recorder *r)
+{
+    for (size_t i = 0; i < r->output_count; i++) {
+        const char *pattern = r->outputs[i].ops->names[0], *digits = strstr(pattern, DRAPE_FRAME_DIGITS);
+        for (int64_t k = 0; digits && k < r->progress.frames; k++) {
+            char name[64];
+            snprintf(name, sizeof name, "%.*s%06" PRId64 "%s", (int)(digits - pattern), pattern, k,
+                     digits + sizeof DRAPE_FRAME_DIGITS - 1);
+            if (!drape_folder_wrote(r->folder, name))
+                return drape_folder_damaged(r->folder, name, "it is not in the manifest");
+        }
+    }
+    return DRAPE_OK;
+}
+
 /* Reads from the checkpoint what the files that grow were, compares all files with what the checkpoint and
  * the manifest describe, and only then removes what follows the frames of the checkpoint. Files of formats
  * that are not written now belong to another run and stay as they are. */
@@ -479,6 +497,8 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
         status = drape_archive_end(a);
     if (!status)
         status = drape_folder_verify(r->folder, is_needed, r);
+    if (!status)
+        status = find_frames(r);
     for (drape_file *file = r->growing; file && !status; file = file->next)
         status = file->kept > 0 ? drape_file_reopen(file) : DRAPE_OK;
     if (!status && !finished)
@@ -552,6 +572,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     status = DRAPE_OK;
     r->also_count = 0;
     if (r->failure) {
+        close_files(r); /* before the message of the first failure is set */
         status = report(r);
         drape_recorder_destroy(&r);
     }

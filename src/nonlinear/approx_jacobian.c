@@ -285,7 +285,9 @@ static drape_status extend(drape_approx_jacobian *s)
     r->row = drape_arena_take(&r->arena, lower, sizeof *r->row);
     r->column = drape_arena_take(&r->arena, lower, sizeof *r->column);
     r->block = drape_arena_take(&r->arena, 9 * lower, sizeof *r->block);
-    return drape_arena_status(&r->arena);
+    const drape_status status = drape_arena_status(&r->arena);
+    r->version = status ? -1 : r->version;
+    return status;
 }
 
 static drape_status build(drape_approx_jacobian *s)
@@ -432,7 +434,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
 {
     bool changed;
     s->friction.acts = false;
-    if (!s->remainder.values)
+    if (!drape_system_has_remainder(s->system))
         return DRAPE_OK;
     drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     if (!status && s->remainder.version != drape_system_pattern_version(s->system))

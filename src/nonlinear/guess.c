@@ -57,7 +57,7 @@ void drape_guess_make_feasible(drape_step_equation *e, double *d, double *aside,
     /* springs beyond their limit pull with forces far above any others: d = 0 is better */
     if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
         memset(d, 0, e->dofs * sizeof *d);
-    if (fraction) {
+    if (e->has_contact) {
         /* What is shortened is the path from where moving colliders have put the nodes at the start of the
          * step: from the start itself, which may lie inside a collider at the end of the step, a part of
          * the path may end inside, too. It is shortened only at nodes that would meet something: all pairs

@@ -7,7 +7,7 @@
 
 #include "nonlinear/step_equation.h"
 
-/* Changes the guess d (free DOFs). aside (free DOFs), fraction (nodes; NULL without contact): scratch. */
+/* Changes the guess d (free DOFs). aside (free DOFs), fraction (nodes, if there is contact): scratch. */
 void drape_guess_make_feasible(drape_step_equation *equation, double *d, double *aside, double *fraction);
 
 #endif

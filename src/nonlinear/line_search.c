@@ -78,7 +78,7 @@ static bool stays_feasible(drape_line_search *s, const double *d, const double *
 {
     drape_step_equation *e = s->equation;
     const double a = s->lengths[0].length;
-    if (!e->x_ahead || !(a > 1))
+    if (!e->has_contact || !(a > 1))
         return true;
     drape_step_equation_move(e, d);
     for (size_t i = 0; i < e->dofs; i++)
@@ -90,7 +90,7 @@ void drape_line_search_along(drape_line_search *s, const double *d, const double
                              double *p)
 {
     const int32_t count = s->islands->count;
-    const bool joint = s->equation->x_ahead;
+    const bool joint = s->equation->has_contact;
     double start = 0;
     measure(s, p);
     for (int32_t k = 0; k < count; k++)

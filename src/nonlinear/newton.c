@@ -101,7 +101,7 @@ struct drape_newton {
     drape_stress_predictor predictor;
     double *step, *right; /* free DOFs: a step, and its right-hand side, that KINSOL does not ask for */
 
-    double *fraction; /* nodes: scratch of feasibility; NULL without contact */
+    double *fraction; /* nodes: scratch of feasibility, if there is contact */
     double edge;      /* [m] mean length of an edge */
 
     /* Kept between the iterations of one solve. */
@@ -138,7 +138,8 @@ static double max_norm_bound(const drape_newton *s)
 
 static bool is_in_contact(const drape_newton *s)
 {
-    return s->fraction && drape_ranks_any(s->equation->ranks, drape_system_touches(s->equation->system));
+    return s->equation->has_contact &&
+           drape_ranks_any(s->equation->ranks, drape_system_touches(s->equation->system));
 }
 
 /* RMS over all nodes; pinned ones do not move. */
@@ -263,7 +264,7 @@ static drape_status guess_linearized(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
     /* Its solution knows of no contact to come. */
-    if (!s->searches || s->fraction || !e->x_start || !(e->pins_ahead > MAX_AHEAD * s->edge) ||
+    if (!s->searches || e->has_contact || !e->x_start || !(e->pins_ahead > MAX_AHEAD * s->edge) ||
         !drape_step_equation_pins_move(e))
         return DRAPE_OK;
     N_VSetArrayPointer(s->search.trial, s->unknown);
@@ -308,7 +309,7 @@ static drape_status judge_islands(drape_newton *s, bool *done)
     drape_diagnostic diagnostic;
     bool changed;
     const drape_status status =
-        s->fraction ? drape_system_extend_pattern(e->system, &e->point, &changed) : DRAPE_OK;
+        e->has_contact ? drape_system_extend_pattern(e->system, &e->point, &changed) : DRAPE_OK;
     find_islands(s);
     *done = !status && drape_stopping_test_residual(&s->stopping, max_norm_bound(s));
     if (*done && s->stopping.ended_by_error &&
@@ -426,7 +427,7 @@ static drape_status estimate(drape_newton *s, const double *d, bool definite, do
                by_error = may && effort->error > 0;
     const double bound = max_norm_bound(s);
     double before = s->residual, length = s->error;
-    for (int more = e->x_ahead ? 1 : MAX_CHORDS; more > 0; more--) {
+    for (int more = e->has_contact ? 1 : MAX_CHORDS; more > 0; more--) {
         const double now = drape_step_equation_norm(e, DRAPE_NORM_MAX), ratio = now / before;
         const bool by_residual = direct && now * (more > 1 ? ratio * ratio : ratio) <= bound;
         drape_status status = DRAPE_OK;
@@ -457,7 +458,7 @@ static drape_status advance(drape_newton *s, const double *d, double fraction, d
 {
     drape_step_equation *e = s->equation;
     const bool definite = !s->positive;
-    const double longest = s->positive && !e->x_ahead ? INFINITY : 1;
+    const double longest = s->positive && !e->has_contact ? INFINITY : 1;
     /* Along the first corrections, which are long. If they have not led near a solution, the sheet may be
      * buckling: then forces extrapolated along a correction are meaningless, and the iteration may cycle. */
     double start = drape_system_clock(e->system);
@@ -706,7 +707,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
     s->edge = drape_model_mean_edge(equation->model);
     memcpy(s->values, values, sizeof s->values);
     s->right = drape_arena_take(arena, equation->dofs, sizeof *s->right);
-    if (equation->x_ahead)
+    if (equation->has_contact)
         s->fraction = drape_arena_take(arena, equation->nodes / 3, sizeof *s->fraction);
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;

@@ -43,8 +43,9 @@ static drape_status take_pattern(drape_nonsymmetric *s)
     s->values = drape_arena_take(&s->arena, (size_t)p->nonzeros, sizeof *s->values);
     s->column = drape_arena_take(&s->arena, blocks, sizeof *s->column);
     s->slot = drape_arena_take(&s->arena, blocks, sizeof *s->slot);
-    s->version = drape_system_pattern_version(s->system);
-    return drape_arena_status(&s->arena);
+    const drape_status status = drape_arena_status(&s->arena);
+    s->version = status ? -1 : drape_system_pattern_version(s->system);
+    return status;
 }
 
 static bool is_zero(const double *block, int64_t stride)

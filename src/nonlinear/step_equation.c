@@ -35,7 +35,8 @@ drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, 
     s->max_residual = INFINITY;
     if (model->has_kinetic)
         s->momentum = drape_arena_take(arena, s->nodes, sizeof *s->momentum);
-    if (drape_system_contact(system))
+    s->has_contact = drape_system_contact(system) != NULL;
+    if (s->has_contact)
         s->x_ahead = drape_arena_take(arena, s->nodes, sizeof *s->x_ahead);
     s->point = (drape_point){.x = s->x, .v = s->v};
     return drape_arena_status(arena);
@@ -96,7 +97,7 @@ static void look_ahead(drape_step_equation *s, const double *p)
 
 double drape_step_equation_make_feasible(drape_step_equation *s, double *p)
 {
-    if (!s->x_ahead)
+    if (!s->has_contact)
         return 1;
     look_ahead(s, p);
     double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t, false, NULL);
@@ -119,7 +120,7 @@ bool drape_step_equation_shorten_nodes(drape_step_equation *s, double *p, double
 
 void drape_step_equation_predict_contact(drape_step_equation *s, const double *p)
 {
-    if (!s->x_ahead)
+    if (!s->has_contact)
         return;
     memset(s->x_ahead, 0, s->nodes * sizeof *s->x_ahead);
     for (size_t i = 0; p && i < s->dofs; i++)

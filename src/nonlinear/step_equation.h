@@ -57,7 +57,8 @@ typedef struct drape_step_equation {
     double max_residual; /* a larger norm may ignore the load of a node; INFINITY unless residual_bound.h
                             sets another */
     double *probe;       /* nodes: scratch of drape_step_equation_rounding and _diagnose */
-    double *x_ahead;     /* nodes: the end of a step tested for contact; NULL without contact */
+    bool has_contact;    /* steps have to be tested for what they pass through */
+    double *x_ahead;     /* nodes: the end of a step that is tested, if there is contact */
     drape_work work;
 } drape_step_equation;
 

@@ -98,6 +98,7 @@ bool drape_hold(drape_sim *sim, drape_trial *trial, bool stopped, drape_status *
 {
     drape_step_info held;
     drape_state *next = &sim->states[sim->next];
+    *error = DRAPE_OK;
     const drape_realtime_memory *m = sim->realtime;
     const bool worn_out = stopped || m->failed >= MOST_IN_A_ROW || m->held_up >= MOST_IN_A_STEP;
     const bool may_help = trial->status >= 0 || trial->status == DRAPE_E_STEP_TOO_SMALL;

@@ -87,9 +87,8 @@ static double longest_step(const drape_realtime_memory *m)
     return m->touches || m->meets ? m->dt : m->longest;
 }
 
-/* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
- * fits, one step for so many frames that it costs no more than their budgets together, and no step before
- * that many frames are owed. */
+/* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If one step costs the
+ * budgets of n frames, it is made when n frames are owed. */
 static plan plan_stretched(drape_sim *sim, double owed, double frame, double budget)
 {
     drape_realtime_memory *m = sim->realtime;
@@ -254,9 +253,8 @@ static void settle(drape_sim *sim, double goal, const drape_catch_up *rates, dra
     m->dropped += report->dropped;
     drape_sim_fall_behind(sim, rates, left, report->dropped);
     m->stretched = report->h > (1 + DRAPE_SAME) * m->dt || m->debt > 0;
-    /* After a rejection, the next call does not retry the rejected step size; later calls do. If no
-     * smaller step was accepted in the call, the next one begins with half of it, which the cap is by
-     * then. */
+    /* After a rejection the cap is the largest step that was accepted in the call or, if none was, half of
+     * the rejected one. It doubles after each call without rejections. */
     if (report->rejected == 0)
         m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
     else if (report->h > 0)

@@ -11,14 +11,12 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
-/* After so many attempts that fail in a row, or so many halvings of a step, the pairs that hold the step up
- * are relaxed; an impact on cloth that has room also takes some attempts. With a time budget, where a frame
- * may have one attempt, after so many attempts that fail before a whole nominal step is made, whatever was
- * accepted between them, the pair that refuses the next attempt is relaxed. With 3 instead of 6, three capes
- * with self-contact were 23 mm inside of bodies, instead of nowhere, and pinches dropped a tenth less
- * time. */
+/* After so many failures in a row, or so many halvings of a step, near pairs are relaxed; an impact on cloth
+ * that has room also takes some attempts. With a time budget, in which a frame may have a single attempt, the
+ * pair that refuses an attempt is relaxed after so many failures within one nominal step, whatever was
+ * accepted between them. With 3 instead of 6, three capes with self-contact were 23 mm inside of bodies,
+ * instead of nowhere, and pinches dropped a tenth less time. */
 #define PATIENCE 6
 
 static drape_contact *contact_of(const drape_sim *sim)

@@ -130,6 +130,7 @@ static drape_status copy_driver(drape_sim *to, drape_sim *from, const int32_t *b
     to->schedule = from->schedule;
     to->next_frame = from->next_frame;
     to->attempts = from->attempts;
+    to->reason = from->reason;
     to->statistics = from->statistics;
     to->earlier = drape_work_sum(from->chosen.integrator->work(from->integrator), &from->earlier);
     const drape_status status = drape_realtime_rescue.go_on(to, from, before);

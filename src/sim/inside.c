@@ -116,7 +116,7 @@ static bool is_outside(const search *s, const int32_t *node)
         vec3_sub(s->cloth.x + 3 * (size_t)node[a], centroid, to);
         radius = fmax(radius, vec3_norm(to));
     }
-    return depth_at(s, centroid) < -(1 + DRAPE_PENETRATION_TOLERANCE) * radius - DRAPE_PENETRATION_TOLERANCE;
+    return depth_at(s, centroid) < -(1 + DRAPE_SAME) * radius - DRAPE_PENETRATION_TOLERANCE;
 }
 
 static double deepest_sample(const search *s, const int32_t *node)

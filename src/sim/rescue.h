@@ -1,5 +1,5 @@
 /*
- * rescue.h: what else may become of a step that fails than a smaller one. The driver of a step (step.c) asks
+ * rescue.h: what may happen after a failed step besides a smaller one. The driver of a step (step.c) asks
  * these functions and knows no more of it. src/realtime/ has the only ones: of advances with a time budget,
  * and of cloth that bodies leave no room.
  */
@@ -17,7 +17,8 @@ typedef struct drape_sent {
 typedef struct drape_rescue_ops {
     /* ---- Of a sim that has asked for it: drape_sim.rescue ---- */
 
-    /* An attempt at a step that ends at t1 begins; its integrator has done its work. */
+    /* Called before the integrator makes an attempt at a step to t1, and after it, whether or not it
+     * succeeded. */
     void (*begin)(drape_sim *sim, double t1);
     void (*solved)(drape_sim *sim, const drape_step_info *info);
     /* Whether any step is better than none, however far from solved it is. */

@@ -6,7 +6,7 @@
 #include "base/arena.h"
 #include "geometry/bvh.h"
 #include "sim/choose.h"
-#include "sim/events.h"
+#include "sim/event_set.h"
 #include "sim/schedule.h"
 
 #define DRAPE_PENETRATION_TOLERANCE 1e-9 /* [m] a point that is less deep in a collider is on its surface */
@@ -181,9 +181,9 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
  * which measures these energies. */
 bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
-/* Settles what the residual of a step to `out` did. What it was dissipated at once is not counted as
- * dissipated. With a time budget, what the residuals so far have put into the motion is taken back from it:
- * its energy never rises but by known work. */
+/* Settles what the residual of a step to `out` did. Work of the residual that damping took in the same step
+ * is subtracted from info->dissipated. With a time budget, what the residuals so far have put into the motion
+ * is taken back from it: its energy never rises but by known work. */
 void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info);
 
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the

@@ -69,8 +69,8 @@ static double outer_work(const drape_sim *sim, const drape_state *from, const dr
                                    sim->chosen.integrator->steady_state ? NULL : dissipated);
 }
 
-/* Makes a step of the integrator and, whatever it left there, has supports hold what they hold. Their work on
- * the mass that they move is what its energy along their directions has changed by: jumps at kinks. */
+/* Makes a step of the integrator, then moves the supported nodes exactly onto their supports. The kinetic
+ * energy that this changes is work of the supports, which jumps at kinks of their motion. */
 static drape_status integrate(drape_sim *sim, drape_state *next, double h, drape_step_info *info)
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
@@ -215,8 +215,8 @@ static void count_reason(drape_sim *sim, drape_reason reason)
 }
 
 /* If the attempt overwrote the state in which the last step began, the sim has no earlier state, as at its
- * start. With a steady-state integrator `before` is kept, because it also says that there was a step, after
- * which there are no more frames. */
+ * start. With a steady-state integrator `before` is kept: drape_sim_emit_frames reads from it that there was
+ * a step, after which there are no more frames. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
     const drape_energy before = sim->energy;
@@ -228,9 +228,9 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
-/* Ends a step of an integrator that has dense output of its own at the time that the schedule was cut to,
- * where the dense output is its solution. False: it has none, or the state does not pass the checks of a
- * step. The work of the step is taken to be done evenly. */
+/* Shortens a finished step to the time that the schedule was cut to, by the dense output of the integrator,
+ * instead of making it again. False: it has none of its own, or the state does not pass the checks of a step.
+ * The work of the step is taken to be done evenly. */
 static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
 {
     const drape_state *now = drape_sim_state(sim);
@@ -254,8 +254,8 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
 }
 
 /* The verdict of events on a step that the controller accepted: STOP if an event function failed; REPEAT if
- * the step is to end at an event, or one acts on the present state. memory: of the controller before it
- * judged. */
+ * the attempt is given up, to be made with another end or because an event acts on the present state. memory:
+ * of the controller before it judged. */
 static drape_verdict ask_events(drape_sim *sim, const double memory[2], drape_trial *trial)
 {
     drape_system_end_step(sim->system); /* what events evaluate leaves no trace in the next step */

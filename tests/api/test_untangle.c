@@ -153,7 +153,7 @@ START_TEST(what_is_kept_is_never_worse)
             says(&h, drape_sim_untangle(h.sim, &def, &u), DRAPE_E_SOLVER, "did not come apart");
             ck_assert(!u.clear && u.inside > 0 && u.inside <= u.inside_before && u.pairs <= u.pairs_before);
             ck_assert_int_eq(u.pairs, 0);
-            ck_assert_double_le(u.strain, 0.25); /* SHARE of the bounds in untangle.c */
+            ck_assert_double_le(u.strain, 0.25); /* SHARE of the bounds in untangle/untangler.c */
             const drape_energy e = drape_sim_energy(h.sim);
             ck_assert(isfinite(e.elastic) && isfinite(e.contact));
             good(&h, drape_sim_advance(h.sim, 0.01));

@@ -235,7 +235,7 @@ START_TEST(of_another_version_or_build_it_is_refused)
         drape_status status = drape_sim_restore_from(v.s.sim, v.good.data, v.good.size);
         ck_assert_int_eq(status, DRAPE_E_VERSION);
         refused(&v, status, "another version");
-        ck_assert_msg(strstr(drape_context_message(v.s.ctx), i < 3 ? "another build" : "format 2"), "%s",
+        ck_assert_msg(strstr(drape_context_message(v.s.ctx), i < 3 ? "another build" : "format 3"), "%s",
                       drape_context_message(v.s.ctx));
         v.good.data[places[i]]--;
         seal(v.good.data, v.good.size);

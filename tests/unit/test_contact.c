@@ -327,7 +327,7 @@ START_TEST(test_bounded_barrier)
 END_TEST
 
 /* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
- * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
+ * s ln s and 2 s are. That of pairs inside agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
  * comes out keeps its energy. */
 START_TEST(test_barrier)
 {

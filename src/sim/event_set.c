@@ -1,4 +1,4 @@
-/* events.c: see events.h. */
+/* event_set.c: see event_set.h. */
 #include "sim/dense.h"
 
 #include "compile/compile.h"
@@ -466,8 +466,6 @@ void drape_events_commit(drape_sim *sim)
         w->count++;
     }
 }
-
-/* ---- Reports and actions ---- */
 
 /* ---- Creation ---- */
 

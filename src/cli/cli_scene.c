@@ -1,7 +1,7 @@
-/* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a
+/* cli_scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a
  * file. */
 #include "cli/cli.h"
-#include "cli/ranks.h"
+#include "cli/cli_ranks.h"
 
 #include "io/recorder.h"
 #include "model/scene.h"

@@ -1,7 +1,7 @@
-/* ranks.h: a verb that can run on several ranks of MPI (mpi/mpi.h). In a build without MPI, and in a process
- * that was started alone, all functions do nothing and there is one rank. */
-#ifndef DRAPE_CLI_RANKS_H
-#define DRAPE_CLI_RANKS_H
+/* cli_ranks.h: a verb that can run on several ranks of MPI (mpi/mpi.h). In a build without MPI, and in a
+ * process that was started alone, all functions do nothing and there is one rank. */
+#ifndef DRAPE_CLI_CLI_RANKS_H
+#define DRAPE_CLI_CLI_RANKS_H
 
 #include "cli/cli.h"
 

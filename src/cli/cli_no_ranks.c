@@ -1,5 +1,5 @@
-/* no_ranks.c: stands for ranks.c in a build without MPI: there is one rank. */
-#include "cli/ranks.h"
+/* cli_no_ranks.c: stands for cli_ranks.c in a build without MPI: there is one rank. */
+#include "cli/cli_ranks.h"
 
 int cli_ranks_begin(const cli_command *command)
 {

@@ -1,5 +1,5 @@
-/* ranks.c: see ranks.h. */
-#include "cli/ranks.h"
+/* cli_ranks.c: see cli_ranks.h. */
+#include "cli/cli_ranks.h"
 
 #include "base/hash.h"
 #include "model/scene.h"

@@ -1,5 +1,5 @@
 /*
- * events.h: events, the roots of functions of the state, located within accepted steps. docs/scene.md has
+ * event_set.h: events, the roots of functions of the state, located within accepted steps. docs/scene.md has
  * what a user sees of them.
  *
  * After each attempt that the controller accepts, and before it is accepted, every event function is
@@ -10,8 +10,8 @@
  * the state that the integrator itself computes, to within EVENT_TOLERANCE. So the run is that of a host that
  * knew the time and advanced to it.
  */
-#ifndef DRAPE_SIM_EVENTS_H
-#define DRAPE_SIM_EVENTS_H
+#ifndef DRAPE_SIM_EVENT_SET_H
+#define DRAPE_SIM_EVENT_SET_H
 
 #include "base/archive.h"
 #include "events/events.h"
