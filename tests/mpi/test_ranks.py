@@ -396,7 +396,7 @@ def test_bad_checkpoints():
     changed.append(good_one[:first] + good_one[second:second + 8] + good_one[first + 8:second] + good_one[first:first + 8] + good_one[second + 8:])
     changed += [good_one[:len(good_one) // 2], good_one[:-8]]
     for data, says in [*((data, "the checkpoint is damaged: its checksum is wrong") for data in changed),
-                       (good_one[:8] + bytes([1]) + good_one[9:], "the checkpoint has format 1; this build reads format 2")]:
+                       (good_one[:8] + bytes([1]) + good_one[9:], "the checkpoint has format 1; this build reads format 3")]:
         assert data != good_one
         with open("out/checkpoint.drape", "wb") as file:
             file.write(data)
