@@ -133,12 +133,12 @@ drape_status drape_active_set_list(drape_active_set *set, const drape_candidates
                                    const drape_exempt *exempt)
 {
     const double rounding = candidates->broad->rounding;
-    int32_t next = 0;
+    drape_candidate_cursor cursor = {0};
     const drape_pair *pair;
     set->count = set->near_count = 0;
     if (set->slots)
         memset(set->slots, 0, (size_t)set->slot_count * sizeof *set->slots);
-    while ((pair = drape_candidates_next(candidates, away, &next))) {
+    while ((pair = drape_candidates_next(candidates, away, &cursor))) {
         drape_active_contact contact;
         if (!drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
             continue;

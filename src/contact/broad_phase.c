@@ -6,6 +6,9 @@
 #include <math.h>
 #include <string.h>
 
+/* Up to so many points and segments of colliders, the elements of the cloth are scanned for each of them: to
+ * fit the trees of the cloth costs as much as twenty scans. */
+#define FEW 16
 /* Upper bound of the activation distance of round features, in the depth by which the middle of an edge may
  * be nearer than its ends. A fast body has a larger one, which holds the nodes; these hold the edges. */
 #define SAGS 2
@@ -115,7 +118,16 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
     s->triangle_collider = drape_arena_take(arena, (size_t)triangles, sizeof *s->triangle_collider);
     s->distance = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->distance);
     s->feature_most = drape_arena_take(arena, (size_t)m->collider_count, sizeof *s->feature_most);
+    s->side = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->side);
     s->near = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near);
+    s->close = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->close);
+    s->near_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->near_node);
+    s->near_element = drape_arena_take(
+        arena, (size_t)(m->edge_count > m->triangle_count ? m->edge_count : m->triangle_count) + 1,
+        sizeof *s->near_element);
+    s->marked_node = drape_arena_take(arena, (size_t)m->node_count, sizeof *s->marked_node);
+    drape_elements_of_create(arena, m->triangle_count, 3, m->triangle, m->node_count, &s->faces_of);
+    drape_elements_of_create(arena, m->edge_count, 2, m->edge, m->node_count, &s->edges_of);
     s->point = drape_arena_take(arena, (size_t)s->points, sizeof *s->point);
     s->corner_reach = drape_arena_take(arena, (size_t)points, sizeof *s->corner_reach);
     s->segment_reach = drape_arena_take(arena, (size_t)s->segments, sizeof *s->segment_reach);
@@ -193,6 +205,14 @@ static bool is_free(const drape_broad_phase *s, int32_t point)
     return point < s->model->node_count && s->model->free_of_node[point] >= 0;
 }
 
+static bool is_marked(const bool *marked, const int32_t *node, int nodes)
+{
+    for (int a = 0; marked && a < nodes; a++)
+        if (marked[node[a]])
+            return true;
+    return !marked;
+}
+
 /* Whether the model ignores a pair. Nodes 0 and 3 are of different pieces, one of which is of cloth. */
 static bool is_ignored(const drape_broad_phase *s, const drape_pair *pair)
 {
@@ -228,7 +248,8 @@ static void meet_own_face(void *user, int32_t node, int32_t face)
         return;
     q->pair.area = s->node_area[node];
     set_nodes(&q->pair, node, t[0], t[1], t[2]);
-    report(q, node, &s->faces, face);
+    if (is_marked(q->want->marked, q->pair.node, 4))
+        report(q, node, &s->faces, face);
 }
 
 static void meet_own_edge(void *user, int32_t a, int32_t b)
@@ -241,7 +262,8 @@ static void meet_own_edge(void *user, int32_t a, int32_t b)
         return;
     q->pair.area = 0.5 * (s->edge_area[second] + s->edge_area[first]);
     set_nodes(&q->pair, f[0], f[1], e[0], e[1]);
-    report(q, first, &s->edges, second);
+    if (is_marked(q->want->marked, q->pair.node, 4))
+        report(q, first, &s->edges, second);
 }
 
 static void meet_face(void *user, int32_t corner, int32_t face)
@@ -277,6 +299,11 @@ static void meet_obstacle(void *user, int32_t node, int32_t triangle)
     report(q, node, &s->obstacles, triangle);
 }
 
+static void begin_stage(query *q, int32_t stage, drape_pair_kind kind)
+{
+    q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
+}
+
 /* Up to which gap [m] from the features of a collider pairs are wanted, without the reach of the query. */
 static double feature_reach(const drape_broad_phase *s, int32_t collider, bool passing)
 {
@@ -300,18 +327,198 @@ static void set_reaches(drape_broad_phase *s, bool passing)
         }
 }
 
-/* Visits the pairs of features of colliders and of elements of cloth. */
-static void join_features(query *q, int32_t stage, drape_pair_kind kind, drape_path_bvh *first,
-                          const double *first_reach, drape_path_bvh *second, const double *second_reach,
-                          drape_path_bvh_meet *meet)
+/* A feature whose elements of cloth are scanned. */
+typedef struct scan {
+    query *query;
+    int32_t feature;
+    drape_path_bvh_meet *meet;
+} scan;
+
+static void scanned(void *user, int32_t element)
+{
+    const scan *of = user;
+    of->meet(of->query, of->feature, element);
+}
+
+/* The nodes that are scanned: all of the cloth, or those of elements that have a marked node. */
+typedef struct scanned_cloth {
+    const int32_t *node; /* (nodes); NULL: all nodes of the model */
+    int32_t nodes;
+    double edge; /* [m] upper bound of the lengths of edges between them on the path */
+} scanned_cloth;
+
+static double square_of_edge(const drape_model *m, const drape_broad_query *want, int32_t edge)
+{
+    const double *const ends[2] = {want->x, want->y};
+    const int32_t *n = m->edge + 2 * (size_t)edge;
+    double largest = 0, d[3];
+    for (int end = 0; end < 2 && ends[end]; end++) {
+        vec3_sub(ends[end] + 3 * (size_t)n[1], ends[end] + 3 * (size_t)n[0], d);
+        const double square = vec3_dot(d, d);
+        largest = square > largest ? square : largest;
+    }
+    return largest;
+}
+
+/* All nodes. The balls around clusters are fitted, by which drape_distant_mark passes over most nodes. */
+static scanned_cloth all_cloth(drape_broad_phase *s, const drape_broad_query *want)
+{
+    double largest = 0;
+    drape_distant_fit(&s->distant, want->x, want->y);
+    for (int32_t e = 0; e < s->model->edge_count; e++) {
+        const double square = square_of_edge(s->model, want, e);
+        largest = square > largest ? square : largest;
+    }
+    return (scanned_cloth){.nodes = s->model->node_count, .edge = sqrt(largest)};
+}
+
+/* Lists the nodes of some elements that are not listed yet. */
+static void list_nodes(drape_broad_phase *s, const drape_path_bvh *tree, const int32_t *element,
+                       int32_t elements, scanned_cloth *to)
+{
+    for (int32_t i = 0; i < elements; i++) {
+        const int32_t *node = tree->node + (size_t)element[i] * (size_t)tree->nodes;
+        for (int a = 0; a < tree->nodes; a++) {
+            if (!s->near[node[a]])
+                s->marked_node[to->nodes++] = node[a];
+            s->near[node[a]] = true;
+        }
+    }
+}
+
+/* The nodes of elements that have a marked node. One edge of such a face may have no marked node; it is not
+ * longer than the other two together. */
+static scanned_cloth marked_cloth(drape_broad_phase *s, const drape_broad_query *want)
+{
+    const int32_t *face = s->faces_of.first, *edge = s->edges_of.first;
+    scanned_cloth some = {.node = s->marked_node};
+    double largest = 0;
+    memset(s->near, 0, (size_t)s->model->node_count * sizeof *s->near);
+    for (int32_t i = 0; i < s->model->node_count; i++) {
+        if (!want->marked[i])
+            continue;
+        list_nodes(s, &s->faces, s->faces_of.element + face[i], face[i + 1] - face[i], &some);
+        list_nodes(s, &s->edges, s->edges_of.element + edge[i], edge[i + 1] - edge[i], &some);
+        for (int32_t e = edge[i]; e < edge[i + 1]; e++) {
+            const double square = square_of_edge(s->model, want, s->edges_of.element[e]);
+            largest = square > largest ? square : largest;
+        }
+    }
+    some.edge = 2 * sqrt(largest);
+    return some;
+}
+
+/* Whether a node is farther than the reach from a collider on its whole path. Then no element that has the
+ * node can meet a feature, since features lie within the surface. */
+static bool is_distant(const drape_broad_phase *s, const drape_broad_query *want, int32_t collider,
+                       int32_t node, double reach)
+{
+    const double *const ends[2] = {want->x, want->y};
+    bool distant = true;
+    for (int end = 0; distant && end < 2 && ends[end]; end++) {
+        double own[3];
+        drape_pose_own(&want->pose[end][collider], ends[end] + 3 * (size_t)node, own);
+        distant = drape_distant_keeps(&s->distant, collider, node, own, reach);
+    }
+    return distant;
+}
+
+/* The gap of the nodes of an element at which the element keeps another gap: if the square of the distance
+ * from a point or a segment is at least D^2 at the corners, it is at least D^2 less a third of the square of
+ * the longest edge everywhere on the element. */
+static double gap_of_nodes(double radius, double gap, double edge)
+{
+    return sqrt((radius + gap) * (radius + gap) + edge * edge / 3) - radius;
+}
+
+/* Lists the elements all of whose nodes are near and one of which is close, each once: at the first node that
+ * is both. */
+static drape_path_elements list_elements(drape_broad_phase *s, const drape_path_bvh *tree,
+                                         const drape_elements_of *of, int32_t points)
+{
+    drape_path_elements among = {.element = s->near_element, .point = s->near_node, .points = points};
+    for (int32_t i = 0; i < points; i++) {
+        const int32_t from = s->near_node[i];
+        for (int32_t k = of->first[from]; s->close[from] && k < of->first[from + 1]; k++) {
+            const int32_t e = of->element[k], *node = tree->node + (size_t)e * (size_t)tree->nodes;
+            bool near = true, first = true, before = true;
+            for (int a = 0; a < tree->nodes; a++) {
+                near = near && s->near[node[a]];
+                before = before && node[a] != from;
+                first = first && !(before && s->near[node[a]] && s->close[node[a]]);
+            }
+            s->near_element[among.elements] = e;
+            among.elements += near && first;
+        }
+    }
+    return among;
+}
+
+static void scan_tree(query *q, const drape_path_bvh *features, int32_t feature, const double *reach,
+                      const drape_path_bvh *tree, const drape_path_elements *among, drape_path_bvh_meet *meet)
 {
     const drape_broad_query *want = q->want;
-    if (first->count == 0 || second->count == 0)
-        return;
-    q->pair = (drape_pair){.kind = kind, .collider = -1, .rank = {stage}};
-    drape_path_bvh_fit(first, want->x, want->y, first_reach);
-    drape_path_bvh_fit(second, want->x, want->y, second_reach);
-    drape_path_bvh_join(first, second, want->y, want->reach, meet, q);
+    const int32_t *node = features->node + (size_t)feature * (size_t)features->nodes;
+    const drape_path_query from = {.node = node,
+                                   .nodes = features->nodes,
+                                   .x = want->x,
+                                   .y = want->y,
+                                   .reach = reach[feature] + want->reach,
+                                   .only_marked = !is_marked(want->marked, node, features->nodes)};
+    drape_path_bvh_scan(tree, &from, among, want->marked, q->broad->side, scanned, &(scan){q, feature, meet});
+}
+
+/* Finds the pairs with features of colliders that have no triangles, by a scan of the cloth near each
+ * feature. */
+static void scan_features(query *q)
+{
+    drape_broad_phase *s = q->broad;
+    const drape_model *m = s->model;
+    const bool *marked = q->want->marked;
+    scanned_cloth all = {.edge = -1}, some = {.edge = -1}; /* -1: not listed yet */
+    int32_t segment = 0;
+    set_reaches(s, q->want->passing);
+    for (int32_t k = 0; k < m->collider_count; k++) {
+        const drape_collider_shape *shape = &m->colliders[k].shape;
+        const int32_t corner = s->first_point[k] - m->node_count, last = segment + shape->segment_count;
+        if (shape->point_count == 0)
+            continue;
+        const bool only_marked = marked && !marked[s->first_point[k]];
+        scanned_cloth *of = only_marked ? &some : &all;
+        if (of->edge < 0)
+            *of = only_marked ? marked_cloth(s, q->want) : all_cloth(s, q->want);
+        /* Marks and lists the nodes that are near or close. If the collider turns, these are all: its
+         * features move straight in space, which is not straight in its coordinates. */
+        const drape_broad_query *want = q->want;
+        const drape_collider_pose *const pose[2] = {&want->pose[0][k], &want->pose[want->y ? 1 : 0][k]};
+        const bool turns = (pose[0]->turned || pose[1]->turned) &&
+                           memcmp(pose[0]->turn, pose[1]->turn, sizeof pose[0]->turn) != 0;
+        const double gap = feature_reach(s, k, want->passing) + want->reach, reach = gap + of->edge,
+                     close = gap_of_nodes(s->model->colliders[k].shape.radius, gap, of->edge);
+        int32_t points = 0;
+        if (of->node || turns)
+            memset(s->near, of->node ? 0 : 1, (size_t)s->model->node_count * sizeof *s->near);
+        else
+            drape_distant_mark(&s->distant, k, pose, reach, s->near);
+        for (int32_t i = 0; i < of->nodes; i++) {
+            const int32_t node = of->node ? of->node[i] : i;
+            if (!of->node && !s->near[node])
+                continue;
+            s->near[node] = turns || !is_distant(s, want, k, node, reach);
+            s->close[node] = turns || (s->near[node] && !is_distant(s, want, k, node, close));
+            s->near_node[points] = node;
+            points += s->near[node];
+        }
+        begin_stage(q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+        drape_path_elements among = list_elements(s, &s->faces, &s->faces_of, points);
+        for (int32_t i = corner; among.elements > 0 && i < corner + shape->point_count; i++)
+            scan_tree(q, &s->corners, i, s->corner_reach, &s->faces, &among, meet_face);
+        begin_stage(q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+        among = list_elements(s, &s->edges, &s->edges_of, shape->segment_count > 0 ? points : 0);
+        for (; segment < last; segment++)
+            if (among.elements > 0)
+                scan_tree(q, &s->segment_tree, segment, s->segment_reach, &s->edges, &among, meet_edge);
+    }
 }
 
 void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want,
@@ -327,18 +534,34 @@ void drape_broad_phase_pairs(drape_broad_phase *s, const drape_broad_query *want
             .y = want->y,
             .reach = drape_broad_phase_wanted(s, want->passing, distance) + want->reach,
             .slack = want->passing || s->model->untangle.given ? INFINITY : want->reach,
-            .rounding = s->rounding};
+            .rounding = s->rounding,
+            .marked = want->marked};
         self_query both = {q, q};
-        both.face.pair = (drape_pair){.kind = DRAPE_PAIR_TRIANGLE, .collider = -1, .rank = {OWN_FACES}};
-        both.edge.pair = (drape_pair){.kind = DRAPE_PAIR_SEGMENTS, .collider = -1, .rank = {OWN_EDGES}};
+        begin_stage(&both.face, OWN_FACES, DRAPE_PAIR_TRIANGLE);
+        begin_stage(&both.edge, OWN_EDGES, DRAPE_PAIR_SEGMENTS);
         both.face.pair.distance = both.edge.pair.distance = distance;
         drape_self_search_pairs(&s->layers, &layers, meet_own_face, meet_own_edge, &both);
     }
+    if (s->corners.count + s->segments <= FEW && s->obstacles.count == 0) {
+        scan_features(&q);
+        return;
+    }
+    const struct {
+        drape_path_bvh *tree;
+        const double *reach;
+    } of[] = {{&s->nodes, NULL},
+              {&s->faces, NULL},
+              {&s->edges, NULL},
+              {&s->corners, s->corner_reach},
+              {&s->segment_tree, s->segment_reach},
+              {&s->obstacles, s->obstacle_reach}};
     set_reaches(s, want->passing);
-    join_features(&q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE, &s->corners, s->corner_reach, &s->faces, NULL,
-                  meet_face);
-    join_features(&q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS, &s->segment_tree, s->segment_reach, &s->edges, NULL,
-                  meet_edge);
-    join_features(&q, OBSTACLES, DRAPE_PAIR_TRIANGLE, &s->nodes, NULL, &s->obstacles, s->obstacle_reach,
-                  meet_obstacle);
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++)
+        drape_path_bvh_fit(of[i].tree, want->x, want->y, want->marked, of[i].reach);
+    begin_stage(&q, FEATURE_FACES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->corners, &s->faces, q.want->y, q.want->reach, meet_face, &q);
+    begin_stage(&q, FEATURE_EDGES, DRAPE_PAIR_SEGMENTS);
+    drape_path_bvh_join(&s->segment_tree, &s->edges, q.want->y, q.want->reach, meet_edge, &q);
+    begin_stage(&q, OBSTACLES, DRAPE_PAIR_TRIANGLE);
+    drape_path_bvh_join(&s->nodes, &s->obstacles, q.want->y, q.want->reach, meet_obstacle, &q);
 }

@@ -30,8 +30,13 @@ typedef struct drape_broad_phase {
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    drape_distant distant;                     /* nodes far from smooth colliders */
-    bool *near;                                /* (node_count) scratch: nodes that a collider may meet */
+    drape_distant distant; /* nodes far from smooth colliders */
+    uint8_t *side;         /* (node_count) scratch of drape_path_bvh_scan, and of a sweep */
+    bool *near, *close;    /* (node_count) scratch: an element can meet a feature of a collider if all
+                                             of its nodes are near and one is close */
+    int32_t *near_node, *near_element;    /* (node_count), (edges or triangles) scratch: lists of these */
+    int32_t *marked_node;                 /* (node_count) scratch: the nodes of marked elements */
+    drape_elements_of faces_of, edges_of; /* of each node, by feature scans */
     double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double *distance;       /* (collider_count) activation distance of cloth and each collider [m] */
     double *feature_most;   /* (collider_count) upper bound of the activation distance of its features [m] */
@@ -48,6 +53,7 @@ typedef struct drape_broad_query {
     const drape_collider_pose *pose[2]; /* (collider_count) at x, and at y */
     double reach;
     bool passing;
+    const bool *marked; /* (points) only pairs with a marked point; NULL: all */
 } drape_broad_query;
 
 /* Calls visit for every such pair, in an order that does not depend on the positions; the order by rank does

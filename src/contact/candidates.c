@@ -7,16 +7,26 @@
 
 #include <string.h>
 
+#define MAX_PATCH 0.3 /* share of the nodes: if more have left their path, all pairs are searched */
+
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, double margin,
                                      drape_candidates *out)
 {
-    const size_t points = (size_t)broad->points, colliders = (size_t)broad->model->collider_count;
     *out = (drape_candidates){.arena = arena, .broad = broad, .margin = margin, .sorter.arena = arena};
-    out->away = drape_arena_take(arena, points + colliders, sizeof *out->away);
-    for (int end = 0; end < 2; end++) {
-        out->x[end] = drape_arena_take(arena, 3 * points, sizeof *out->x[end]);
-        out->pose[end] = drape_arena_take(arena, colliders, sizeof *out->pose[end]);
+    const size_t marks = (size_t)(broad->points + broad->model->collider_count);
+    for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++) {
+        drape_candidate_set *set = &out->set[i];
+        set->away = drape_arena_take(arena, marks, sizeof *set->away);
+        for (int end = 0; end < 2; end++) {
+            set->x[end] = drape_arena_take(arena, 3 * (size_t)broad->points, sizeof *set->x[end]);
+            set->pose[end] =
+                drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *set->pose[end]);
+        }
     }
+    out->level = drape_arena_take(arena, marks, sizeof *out->level);
+    out->marked = drape_arena_take(arena, marks, sizeof *out->marked);
+    out->beyond = drape_arena_take(arena, marks, sizeof *out->beyond);
+    out->stale = drape_arena_take(arena, (size_t)broad->model->collider_count, sizeof *out->stale);
     return drape_arena_status(arena);
 }
 
@@ -88,7 +98,7 @@ static void consider(void *user, const drape_pair *found)
 }
 
 /* Pairs of nodes and smooth colliders. */
-static void find_surfaces(search *s)
+static void find_surfaces(search *s, const bool *marked)
 {
     drape_broad_phase *broad = s->broad;
     const drape_model *m = broad->model;
@@ -98,14 +108,17 @@ static void find_surfaces(search *s)
         if (!m->colliders[k].ops->smooth)
             continue;
         const drape_collider_pose *const pose[2] = {&end[0].pose[k], &end[s->moves].pose[k]};
+        const bool *wanted = marked && !marked[broad->points + k] ? marked : broad->near;
         const double gap = drape_broad_phase_wanted(broad, s->passing, broad->distance[k]) + s->reach;
-        if (!fitted)
-            drape_distant_fit(&broad->distant, end[0].x, s->moves ? end[1].x : NULL);
-        fitted = true;
-        drape_distant_mark(&broad->distant, k, pose, gap, broad->near);
+        if (wanted == broad->near) {
+            if (!fitted)
+                drape_distant_fit(&broad->distant, end[0].x, s->moves ? end[1].x : NULL);
+            fitted = true;
+            drape_distant_mark(&broad->distant, k, pose, gap, broad->near);
+        }
         for (int32_t i = 0; i < m->free_count; i++) {
             const int32_t node = m->node_of_free[i];
-            if (!broad->near[node] || drape_model_ignores(m, k, node))
+            if (!wanted[node] || drape_model_ignores(m, k, node))
                 continue;
             const drape_pair pair = drape_broad_phase_surface(broad, node, k);
             bool beyond = true; /* the node stays beyond the reach of the surface on the whole path */
@@ -129,7 +142,7 @@ static bool differ(const drape_broad_phase *broad, const drape_configuration end
 }
 
 void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *path, double margin,
-                           bool passing, drape_broad_phase_visit *visit, void *user)
+                           bool passing, const bool *marked, drape_broad_phase_visit *visit, void *user)
 {
     const drape_model *m = broad->model;
     search s = {.broad = broad,
@@ -141,46 +154,30 @@ void drape_candidates_find(drape_broad_phase *broad, const drape_straight_path *
                 .visit = visit,
                 .user = user};
     if (!passing)
-        find_surfaces(&s);
+        find_surfaces(&s, marked);
     const drape_broad_query want = {.x = path->end[0].x,
                                     .y = s.moves ? path->end[1].x : NULL,
                                     .pose = {path->end[0].pose, path->end[1].pose},
                                     .reach = s.reach,
-                                    .passing = passing};
+                                    .passing = passing,
+                                    .marked = marked};
     drape_broad_phase_pairs(broad, &want, consider, &s);
 }
 
+typedef struct collector {
+    drape_arena *arena;
+    drape_candidate_set *set;
+} collector;
+
 static void add(void *user, const drape_pair *pair)
 {
-    drape_candidates *c = user;
-    if (!drape_list_append(c->arena, &c->pairs, &c->count, &c->capacity, pair, sizeof *pair))
-        c->complete = false;
+    const collector *to = user;
+    drape_candidate_set *set = to->set;
+    if (!drape_list_append(to->arena, &set->pairs, &set->count, &set->capacity, pair, sizeof *pair))
+        set->known = false;
 }
 
-drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path)
-{
-    drape_straight_path own;
-    for (int end = 0; end < 2; end++) {
-        memcpy(c->x[end], path->end[end].x, 3 * (size_t)c->broad->points * sizeof *c->x[end]);
-        memcpy(c->pose[end], path->end[end].pose,
-               (size_t)c->broad->model->collider_count * sizeof *c->pose[end]);
-        own.end[end] = (drape_configuration){.model = c->broad->model, .x = c->x[end], .pose = c->pose[end]};
-    }
-    c->count = 0;
-    c->complete = true;
-    drape_candidates_find(c->broad, &own, c->margin, false, add, c);
-    const drape_status status =
-        c->complete ? drape_sort_pairs(&c->sorter, c->pairs, c->count) : DRAPE_E_MEMORY;
-    c->known = !status;
-    return status;
-}
-
-void drape_candidates_forget(drape_candidates *c)
-{
-    c->known = false;
-}
-
-/* ---- Distance from the path ---- */
+/* ---- Distance from the paths ---- */
 
 /* Sums of path . (x - x0) and of path . path over all coordinates. */
 LANES_DISPATCH static void sum_along(const double *x, const double *x0, const double *x1, size_t count,
@@ -204,6 +201,14 @@ LANES_DISPATCH static void sum_along(const double *x, const double *x0, const do
     }
 }
 
+/* The step fraction of the path at which it is nearest to a configuration, in the mean over all points. */
+static double nearest_fraction(const drape_candidates *c, const drape_candidate_set *set, const double *x)
+{
+    double along, square;
+    sum_along(x, set->x[0], set->x[1], 3 * (size_t)c->broad->points, &along, &square);
+    return along > 0 ? fmin(along / square, 1) : 0;
+}
+
 /* The square of the distance from a point to its place on the path from a to b. */
 static double square_away(const double *x, const double *a, const double *b, double t)
 {
@@ -213,54 +218,68 @@ static double square_away(const double *x, const double *a, const double *b, dou
     return vec3_dot(d, d);
 }
 
-static double square_of_point(const drape_candidates *c, const double *x, int32_t point, double t)
+/* How much farther nodes are from their paths in the coordinates of a turned collider, in which the search
+ * took these paths to be straight, than in space. Nodes that were marked for a later set do not count. */
+static double distance_of_turned(const drape_candidates *c, int set, const drape_configuration *at,
+                                 int32_t collider, double t)
 {
-    const size_t i = 3 * (size_t)point;
-    return square_away(x + i, c->x[0] + i, c->x[1] + i, t);
-}
-
-/* How far a collider is from its path. If it is turned, how much farther nodes are from their paths in its
- * coordinates, in which the search took these paths to be straight, than in space. */
-static double square_of_collider(const drape_candidates *c, const drape_configuration *at, int32_t k,
-                                 double t)
-{
+    const drape_candidate_set *from = &c->set[set];
     const drape_model *m = c->broad->model;
-    const drape_collider_pose *const pose[2] = {&c->pose[0][k], &c->pose[1][k]};
     double largest = 0;
-    if (!pose[0]->turned && !pose[1]->turned && !at->pose[k].turned)
-        return square_away(at->pose[k].displacement, pose[0]->displacement, pose[1]->displacement, t);
-    for (int32_t f = 0; m->colliders[k].ops->smooth && f < m->free_count; f++) {
+    for (int32_t f = 0; f < m->free_count; f++) {
         const int32_t node = m->node_of_free[f];
         const size_t i = 3 * (size_t)node;
         double first[3], last[3], now[3];
-        drape_pose_own(pose[0], c->x[0] + i, first);
-        drape_pose_own(pose[1], c->x[1] + i, last);
-        drape_pose_own(&at->pose[k], at->x + i, now);
-        const double away = sqrt(square_away(now, first, last, t)) - sqrt(square_of_point(c, at->x, node, t));
+        if (c->level[node] > set)
+            continue;
+        drape_pose_own(&from->pose[0][collider], from->x[0] + i, first);
+        drape_pose_own(&from->pose[1][collider], from->x[1] + i, last);
+        drape_pose_own(&at->pose[collider], at->x + i, now);
+        const double away = sqrt(square_away(now, first, last, t)) -
+                            sqrt(square_away(at->x + i, from->x[0] + i, from->x[1] + i, t));
         if (isnan(away))
             return NAN;
         largest = fmax(largest, away);
     }
-    return largest * largest;
+    return largest;
 }
 
-/* The largest distance from the path, at the step fraction at which the path is nearest to the configuration
- * in the mean over all points; INFINITY if it is above the margin. Notes the distance of each point and
- * collider; if `last`, the larger one of both ends. */
-static double distance_from(const drape_candidates *c, const drape_configuration *at, bool last)
+static double square_of_collider(const drape_candidates *c, int set, const drape_configuration *at, int32_t k,
+                                 double t)
 {
+    const drape_candidate_set *from = &c->set[set];
+    if (!from->pose[0][k].turned && !from->pose[1][k].turned && !at->pose[k].turned)
+        return square_away(at->pose[k].displacement, from->pose[0][k].displacement,
+                           from->pose[1][k].displacement, t);
+    const double away = c->broad->model->colliders[k].ops->smooth ? distance_of_turned(c, set, at, k, t) : 0;
+    return away * away;
+}
+
+static double square_of_point(const drape_candidate_set *from, const double *x, int32_t point, double t)
+{
+    const size_t i = 3 * (size_t)point;
+    return square_away(x + i, from->x[0] + i, from->x[1] + i, t);
+}
+
+/* The largest distance from the path of a set, among the points and colliders that were not marked for a
+ * later set; INFINITY if it is above the margin. Notes the distance of each; if `last`, the larger one of
+ * both ends. */
+static double distance_from(const drape_candidates *c, int set, const drape_configuration *at, bool last)
+{
+    const drape_candidate_set *from = &c->set[set];
     const int32_t points = c->broad->points;
-    double largest = 0, along, square_of_path;
-    sum_along(at->x, c->x[0], c->x[1], 3 * (size_t)points, &along, &square_of_path);
-    const double t = along > 0 ? fmin(along / square_of_path, 1) : 0, limit = c->margin * c->margin;
+    const double t = nearest_fraction(c, from, at->x), limit = c->margin * c->margin;
+    double largest = 0;
     for (int32_t i = 0; i < points + c->broad->model->collider_count; i++) {
+        if (c->level[i] > set)
+            continue;
         const double square =
-            i < points ? square_of_point(c, at->x, i, t) : square_of_collider(c, at, i - points, t);
+            i < points ? square_of_point(from, at->x, i, t) : square_of_collider(c, set, at, i - points, t);
         if (!(square <= limit))
             return INFINITY;
         const double away = sqrt(square);
         largest = away > largest ? away : largest;
-        c->away[i] = last && c->away[i] > away ? c->away[i] : away;
+        from->away[i] = last && from->away[i] > away ? from->away[i] : away;
     }
     return largest;
 }
@@ -268,22 +287,140 @@ static double distance_from(const drape_candidates *c, const drape_configuration
 drape_distances drape_candidates_distances(const drape_candidates *c, const drape_straight_path *path)
 {
     const bool moves = path->end[1].x != path->end[0].x || path->end[1].pose != path->end[0].pose;
-    drape_distances away = {.largest = c->known ? distance_from(c, &path->end[0], false) : INFINITY};
-    if (!isinf(away.largest) && moves)
-        away.largest = fmax(away.largest, distance_from(c, &path->end[1], true));
+    drape_distances away = {.set = {INFINITY}};
+    bool stale = false;
+    for (int32_t i = 0; i < c->broad->model->collider_count; i++)
+        stale = stale || c->stale[i];
+    for (int i = 0; i < c->sets && !stale; i++) {
+        away.set[i] = distance_from(c, i, &path->end[0], false);
+        if (!isinf(away.set[i]) && moves)
+            away.set[i] = fmax(away.set[i], distance_from(c, i, &path->end[1], true));
+        if (!(away.set[i] <= c->margin))
+            break;
+    }
     return away;
+}
+
+double drape_candidates_farthest(const drape_candidates *c, const drape_distances *away)
+{
+    double largest = away->set[0];
+    for (int i = 1; i < c->sets; i++)
+        largest = fmax(largest, away->set[i]);
+    largest += away->stray;
+    return largest <= c->margin ? largest : INFINITY;
+}
+
+/* Notes, for each point and collider, from the paths of which sets it is farther than the margin. Returns
+ * false if a position is not finite. */
+static bool note_beyond(drape_candidates *c, const drape_straight_path *path)
+{
+    const int32_t points = c->broad->points, count = points + c->broad->model->collider_count;
+    const double limit = c->margin * c->margin;
+    memset(c->beyond, 0, (size_t)count * sizeof *c->beyond);
+    for (int set = 0; set < c->sets; set++)
+        for (int end = 0; end < 2; end++) {
+            const drape_configuration *at = &path->end[end];
+            const double t = nearest_fraction(c, &c->set[set], at->x);
+            for (int32_t i = 0; i < count; i++) {
+                if (c->level[i] > set)
+                    continue;
+                const double square = i < points ? square_of_point(&c->set[set], at->x, i, t)
+                                                 : square_of_collider(c, set, at, i - points, t);
+                if (isnan(square))
+                    return false;
+                c->beyond[i] |= (uint8_t)((square > limit) << set);
+            }
+        }
+    return true;
+}
+
+/* Marks the points and colliders that must be in a patch which follows the first `sets` sets: those that have
+ * left the paths of these sets, and those of the patches that it replaces. Returns the number of marked
+ * nodes. */
+static int32_t mark(drape_candidates *c, int sets)
+{
+    const drape_broad_phase *broad = c->broad;
+    const int32_t nodes = broad->model->node_count, points = broad->points;
+    const unsigned int kept = (1u << sets) - 1;
+    int32_t count = 0;
+    for (int32_t i = 0; i < points + broad->model->collider_count; i++)
+        c->marked[i] = c->level[i] >= sets || (c->beyond[i] & kept) || (i >= points && c->stale[i - points]);
+    for (int32_t i = nodes; i < points; i++) /* a collider with all of its points */
+        c->marked[points + broad->point_collider[i - nodes]] |= c->marked[i];
+    for (int32_t i = nodes; i < points; i++)
+        c->marked[i] = c->marked[points + broad->point_collider[i - nodes]];
+    for (int32_t i = 0; i < nodes; i++)
+        count += c->marked[i];
+    return count;
+}
+
+/* After how many sets the next patch is searched, whose points and colliders are marked: after all sets, or
+ * after the first one, in place of all patches, if that marks fewer nodes or all sets are in use. 0: all
+ * pairs are searched. */
+static int choose_set(drape_candidates *c, const drape_straight_path *path)
+{
+    const int32_t nodes = c->broad->model->node_count;
+    if (c->sets == 0 || !note_beyond(c, path))
+        return 0;
+    const int32_t after_all = c->sets > 1 && c->sets < DRAPE_CANDIDATE_SETS ? mark(c, c->sets) : nodes + 1,
+                  after_first = mark(c, 1);
+    if (after_all < after_first)
+        return mark(c, c->sets) <= MAX_PATCH * nodes ? c->sets : 0;
+    return after_first <= MAX_PATCH * nodes ? 1 : 0;
+}
+
+bool drape_candidates_patch_serves(drape_candidates *c, const drape_straight_path *path)
+{
+    return choose_set(c, path) > 0;
+}
+
+drape_status drape_candidates_search(drape_candidates *c, const drape_straight_path *path)
+{
+    const int sets = choose_set(c, path);
+    const size_t count = (size_t)(c->broad->points + c->broad->model->collider_count);
+    for (size_t i = 0; i < count; i++)
+        c->level[i] = sets > 0 && c->marked[i] ? (uint8_t)sets : sets > 0 ? c->level[i] : 0;
+    memset(c->stale, 0, (size_t)c->broad->model->collider_count * sizeof *c->stale);
+    drape_candidate_set *set = &c->set[sets];
+    const bool *marked = sets > 0 ? c->marked : NULL;
+    drape_straight_path own;
+    for (int end = 0; end < 2; end++) {
+        memcpy(set->x[end], path->end[end].x, 3 * (size_t)c->broad->points * sizeof *set->x[end]);
+        memcpy(set->pose[end], path->end[end].pose,
+               (size_t)c->broad->model->collider_count * sizeof *set->pose[end]);
+        own.end[end] =
+            (drape_configuration){.model = c->broad->model, .x = set->x[end], .pose = set->pose[end]};
+    }
+    set->count = 0;
+    set->known = true;
+    drape_candidates_find(c->broad, &own, c->margin, false, marked, add, &(collector){c->arena, set});
+    const drape_status status =
+        set->known ? drape_sort_pairs(&c->sorter, set->pairs, set->count) : DRAPE_E_MEMORY;
+    c->sets = status ? 0 : sets + 1;
+    return status;
+}
+
+void drape_candidates_forget(drape_candidates *c)
+{
+    c->sets = 0;
+}
+
+void drape_candidates_forget_collider(drape_candidates *c, int32_t collider)
+{
+    c->stale[collider] = true;
 }
 
 /* ---- The list ---- */
 
 /* Whether the gap can be below the activation distance, since the search found it: each piece has moved off
  * its path by at most the largest distance of its points. */
-static bool may_become_active(const drape_candidates *c, const drape_pair *pair, const drape_distances *away)
+static bool may_become_active(const drape_candidates *c, int set, const drape_pair *pair,
+                              const drape_distances *away)
 {
     const double slack = pair->gap_at_search - pair->distance - away->beyond - c->broad->rounding;
-    if (!(slack >= 0) || !(away->largest <= c->margin))
+    if (!(slack >= 0) || !(away->set[set] <= c->margin))
         return true;
-    const double *of = c->away;
+    const double *of = c->set[set].away;
     const int32_t *n = pair->node;
     double first = of[n[0]], second;
     if (pair->kind == DRAPE_PAIR_SURFACE)
@@ -297,9 +434,34 @@ static bool may_become_active(const drape_candidates *c, const drape_pair *pair,
     return slack < first + second + 2 * away->stray;
 }
 
-const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_distances *away, int32_t *at)
+/* Whether the set is the last one for which a piece of the pair was marked: other sets have outdated copies
+ * of the pair. */
+static bool is_of(const drape_candidates *c, const drape_pair *pair, int set)
 {
-    while (*at < c->count && !may_become_active(c, &c->pairs[*at], away))
-        (*at)++;
-    return *at < c->count ? &c->pairs[(*at)++] : NULL;
+    const int points = drape_pair_points(pair);
+    int level = pair->collider >= 0 ? c->level[c->broad->points + pair->collider] : 0;
+    for (int a = 0; a < points; a++)
+        level = c->level[pair->node[a]] > level ? c->level[pair->node[a]] : level;
+    return level == set;
+}
+
+const drape_pair *drape_candidates_next(const drape_candidates *c, const drape_distances *away,
+                                        drape_candidate_cursor *cursor)
+{
+    const drape_pair *next = NULL;
+    int from = 0;
+    for (int i = 0; i < c->sets; i++) {
+        const drape_candidate_set *set = &c->set[i];
+        int32_t at = cursor->at[i];
+        while (at < set->count && ((c->sets > 1 && !is_of(c, &set->pairs[at], i)) ||
+                                   !may_become_active(c, i, &set->pairs[at], away)))
+            at++;
+        cursor->at[i] = at;
+        if (at < set->count && (!next || drape_pair_is_before(&set->pairs[at], next))) {
+            next = &set->pairs[at];
+            from = i;
+        }
+    }
+    cursor->at[from] += next != NULL;
+    return next;
 }

@@ -110,7 +110,8 @@ static const drape_candidates *with_stray(const drape_candidates *candidates, do
                                           drape_distances *away)
 {
     away->stray = stray;
-    return candidates && drape_candidates_are_valid(candidates, away) ? candidates : NULL;
+    return candidates && drape_candidates_farthest(candidates, away) <= candidates->margin ? candidates
+                                                                                           : NULL;
 }
 
 double drape_contact_stray(const drape_collider *collider, double angle)
@@ -143,7 +144,7 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
                  .surfaces = of_surfaces,
                  .cancel = cancel};
     drape_distances away;
-    int32_t next = 0;
+    drape_candidate_cursor cursor = {0};
     /* The candidates that are valid on the whole path; searched if there are none. NULL if the path is too
      * long for candidates, if only few pairs matter on it, or if memory is out: then pairs are followed as
      * they are found. */
@@ -152,11 +153,11 @@ double drape_contact_free_fraction(drape_contact *c, const drape_straight_path *
     if (!candidates && !only_least && !(longest_move(&p) > DRAPE_LONGEST_SEARCH * c->mean_edge))
         candidates = with_stray(drape_contact_search(c, straight, &away), stray, &away);
     const drape_pair *pair;
-    while (candidates && (pair = drape_candidates_next(candidates, &away, &next)))
+    while (candidates && (pair = drape_candidates_next(candidates, &away, &cursor)))
         follow(&p, pair);
     if (!candidates) {
         const double start = drape_clock_seconds();
-        drape_candidates_find(&c->broad, straight, stray / 2, only_least, follow, &p);
+        drape_candidates_find(&c->broad, straight, stray / 2, only_least, NULL, follow, &p);
         c->search_seconds += drape_clock_seconds() - start;
     }
     for (int32_t k = 0; of_surfaces && k < c->model->collider_count; k++)
@@ -364,7 +365,7 @@ bool drape_contact_may_meet(drape_contact *c, const double *x, const double *v, 
             meets =
                 !drape_model_ignores(m, k, m->node_of_free[i]) && may_touch(c, k, m->node_of_free[i], &path);
     if (!meets)
-        drape_candidates_find(&c->broad, &path, 0, true, note, &meets);
+        drape_candidates_find(&c->broad, &path, 0, true, NULL, note, &meets);
     c->seconds += drape_clock_seconds() - start;
     return meets;
 }

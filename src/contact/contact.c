@@ -10,7 +10,7 @@
  *     clusters.c, flat.c, self_search.c, distant.c, broad_phase.c
  *                        pairs of pieces that no axis separates on a path, found in trees of boxes
  *     sort_pairs.c, candidates.c
- *                        those that can become active near the path
+ *                        those that can become active near the path; where some points have left it, a patch
  *     active.c           the active set: candidates whose gap is below the activation distance, equal ones
  *                        merged; exempt.h: pairs that are not held, said from outside
  *     predict.c          normal forces at the end of an iteration of Newton's method
@@ -93,8 +93,7 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
         c->on_point = drape_arena_take(arena, deforming > 0 ? points - nodes : 0, 3 * sizeof *c->on_point);
         c->swing = drape_arena_take(arena, colliders, sizeof *c->swing);
         c->before = drape_arena_take(arena, nodes, sizeof *c->before);
-        c->moved = drape_arena_take(arena, nodes, sizeof *c->moved);
-        c->slid = drape_arena_take(arena, nodes, sizeof *c->slid);
+        c->moved = drape_arena_take(arena, points + colliders, sizeof *c->moved);
         c->carried = drape_arena_take(arena, nodes, sizeof *c->carried);
         c->deformed = drape_arena_take(arena, colliders, sizeof *c->deformed);
         c->body = drape_arena_take(arena, colliders, sizeof *c->body);
@@ -288,8 +287,8 @@ static double path_of(const drape_contact *c, int32_t collider, double t)
 static void set_distance(drape_contact *c, int32_t collider, double distance)
 {
     c->broad.distance[collider] = distance;
-    drape_candidates_forget(&c->step_candidates);
-    drape_candidates_forget(&c->query_candidates);
+    drape_candidates_forget_collider(&c->step_candidates, collider);
+    drape_candidates_forget_collider(&c->query_candidates, collider);
 }
 
 /* Contact with a fast collider over a distance that it crosses in a small part of a step is hard to solve: in

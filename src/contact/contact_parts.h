@@ -77,8 +77,7 @@ struct drape_contact {
     double *from, *to;                       /* (points x 3) the ends of a displacement: ccd.c */
     double *before; /* (node_count) of_node of the last step fraction, if that was one of pairs: */
     bool has_before;
-    bool *moved, *carried;          /* (node_count) scratch of sweep.c, */
-    uint8_t *slid;                  /* (node_count) this, too */
+    bool *moved, *carried;          /* (points + collider_count), (node_count) scratch of sweep.c */
     drape_collider_pose *path_pose; /* (collider_count) */
     drape_collider_pose *kink_pose; /* (collider_count) */
     int32_t *coupling;              /* (coupling_count of coupling_capacity x 4) */

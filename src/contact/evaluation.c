@@ -136,7 +136,7 @@ static bool are_valid(const drape_candidates *candidates, const drape_straight_p
                       drape_distances *away)
 {
     *away = drape_candidates_distances(candidates, path);
-    return drape_candidates_are_valid(candidates, away);
+    return drape_candidates_farthest(candidates, away) <= candidates->margin;
 }
 
 const drape_candidates *drape_contact_valid_candidates(const drape_contact *c,
@@ -154,7 +154,8 @@ const drape_candidates *drape_contact_search(drape_contact *c, const drape_strai
     drape_candidates *candidates = c->between_steps ? &c->query_candidates : &c->step_candidates;
     const drape_status status = drape_candidates_search(candidates, path);
     if (!are_valid(candidates, path, away)) /* if positions are not finite */
-        away->largest = INFINITY;
+        for (int i = 0; i < DRAPE_CANDIDATE_SETS; i++)
+            away->set[i] = INFINITY;
     c->search_seconds += drape_clock_seconds() - start;
     c->out_of_memory = c->out_of_memory || status != DRAPE_OK;
     return status ? NULL : candidates;
@@ -191,7 +192,7 @@ drape_status drape_contact_list(drape_contact *c, const drape_configuration *at)
         /* In a step the search covers the path from c->start, where this step begins, because the check at
          * its end needs the pairs on that path. */
         drape_straight_path path = here;
-        if (in_step && is_near_start(c, at->x))
+        if (in_step && !drape_candidates_patch_serves(&c->step_candidates, &here) && is_near_start(c, at->x))
             path.end[0] = (drape_configuration){.model = c->model, .x = c->start, .pose = c->start_pose};
         candidates = drape_contact_search(c, &path, &away);
     }

@@ -414,14 +414,15 @@ int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
      * patterns that they save. The pairs are taken from the candidates only if these contain all of them: a
      * pattern depends on the positions alone. */
     const drape_candidates *candidates = drape_contact_valid_candidates(c, &here, &away);
-    if (candidates && away.largest + 0.5 * list.margin <= candidates->margin) {
-        int32_t next = 0;
+    if (candidates &&
+        drape_candidates_farthest(candidates, &away) + 0.5 * list.margin <= candidates->margin) {
+        drape_candidate_cursor cursor = {0};
         const drape_pair *pair;
         away.beyond = list.margin;
-        while ((pair = drape_candidates_next(candidates, &away, &next)))
+        while ((pair = drape_candidates_next(candidates, &away, &cursor)))
             list_near(&list, pair);
     } else {
-        drape_candidates_find(&c->broad, &here, 0.5 * list.margin, false, list_near, &list);
+        drape_candidates_find(&c->broad, &here, 0.5 * list.margin, false, NULL, list_near, &list);
         c->search_seconds += drape_clock_seconds() - start;
     }
     c->seconds += drape_clock_seconds() - start;

@@ -15,6 +15,7 @@ drape_status drape_self_search_create(drape_arena *arena, const drape_model *mod
     out->fitted = drape_arena_take(arena, (size_t)c->count, sizeof *out->fitted);
     out->low = drape_arena_take(arena, (size_t)c->branch_count, sizeof *out->low);
     out->high = drape_arena_take(arena, (size_t)c->branch_count, sizeof *out->high);
+    out->marked = drape_arena_take(arena, (size_t)c->branch_count, sizeof *out->marked);
     return status ? status : drape_arena_status(arena);
 }
 
@@ -33,6 +34,14 @@ static void fit_leaf(const drape_clusters *c, const drape_cluster *cluster, cons
             low[k] = at < low[k] ? at : low[k];
             high[k] = at > high[k] ? at : high[k];
         }
+}
+
+static bool has_marked(const drape_clusters *c, const drape_cluster *cluster, const bool *marked)
+{
+    bool any = !marked;
+    for (int32_t i = 0; !any && i < cluster->points; i++)
+        any = marked[c->point[cluster->first_point + i]];
+    return any;
 }
 
 /* A box that is apart from every other one. */
@@ -194,7 +203,8 @@ static bool are_apart(const traversal *t, int32_t a, int32_t b)
 static void meet(const traversal *t, int32_t a, int32_t b)
 {
     int32_t next[4][2];
-    if ((a != b && are_apart(t, a, b)) || drape_flat_keeps_apart(&t->search->flat, a, b, &t->flat))
+    if (!(t->search->marked[a] || t->search->marked[b]) || (a != b && are_apart(t, a, b)) ||
+        drape_flat_keeps_apart(&t->search->flat, a, b, &t->flat))
         return;
     const int count = drape_clusters_descend(&t->search->clusters, a, b, next);
     if (count == 0) {
@@ -233,6 +243,7 @@ void drape_self_search_pairs(drape_self_search *s, const drape_self_query *want,
     for (int32_t i = c->branch_count - 1; i >= 0; i--) {
         const int32_t a = i + 1, b = c->branches[i].second;
         const drape_cluster *cluster = &c->cluster[c->branches[i].cluster];
+        s->marked[i] = b > 0 ? s->marked[a] || s->marked[b] : has_marked(c, cluster, want->marked);
         for (int end = 0; end < 2 && ends[end]; end++) {
             double *low = s->low[i][end], *high = s->high[i][end];
             if (b == 0)

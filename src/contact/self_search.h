@@ -16,6 +16,7 @@ typedef struct drape_self_search {
     drape_path_boxes *boxes[DRAPE_ELEMENT_KINDS]; /* (groups) */
     int64_t *fitted;                              /* (clusters) the search in which the boxes were fitted */
     double (*low)[2][3], (*high)[2][3];           /* (branches) by end and axis */
+    bool *marked;                                 /* (branches) */
     int64_t search;                               /* the number of searches so far */
 } drape_self_search;
 
@@ -24,11 +25,12 @@ drape_status drape_self_search_create(drape_arena *arena, const drape_model *mod
                                       drape_self_search *out);
 
 /* Which pairs are searched: those that may be nearer than `reach` on the path from x to y (y NULL: at x).
- * Pairs whose pieces are surely at least half of their distance at rest plus `slack` apart may be left
- * out. */
+ * Pairs whose pieces are surely at least half of their distance at rest plus `slack` apart may be left out.
+ * marked (node_count): only pairs of clusters of which one has a marked node; NULL: all. */
 typedef struct drape_self_query {
     const double *x, *y;
     double reach, slack, rounding; /* [m] */
+    const bool *marked;
 } drape_self_query;
 
 /* Calls the functions for all such pairs, also of elements that share a node, in an order that does not

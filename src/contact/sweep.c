@@ -234,7 +234,7 @@ static bool slide_on_meshes(drape_contact *c, double *y)
     bool moved = false;
     for (int32_t k = 0; k < c->model->collider_count; k++)
         reach = fmax(reach, c->broad.obstacle_radius + c->broad.distance[k]);
-    drape_path_bvh_fit(tree, c->start, y, NULL);
+    drape_path_bvh_fit(tree, c->start, y, NULL, NULL);
     for (int32_t f = 0; f < c->model->free_count; f++) {
         meeting m = {.contact = c, .y = y, .node = c->model->node_of_free[f], .fraction = 1, .gap = INFINITY};
         const drape_path_query query = {.node = &m.node, .nodes = 1, .x = c->start, .y = y, .reach = reach};
@@ -260,7 +260,7 @@ static bool sweep_meshes(drape_contact *c, double *y)
 
 static void sweep_all(drape_contact *c, double *y)
 {
-    uint8_t *slid = c->slid;
+    uint8_t *slid = c->broad.side;
     bool moved = true;
     memset(slid, 0, (size_t)c->model->node_count * sizeof *slid);
     drape_distant_fit(&c->broad.distant, c->start, y);
@@ -297,14 +297,12 @@ static void meet(void *user, const drape_pair *pair)
     layers *of = user;
     drape_contact *c = of->contact;
     const drape_keep keep = drape_contact_keep_step(c);
-    const int32_t *n = pair->node;
-    if (pair->collider >= 0 || !(c->moved[n[0]] || c->moved[n[1]] || c->moved[n[2]] || c->moved[n[3]]) ||
-        drape_pair_step_fraction(pair, c->start, c->to, NULL, &keep, 1) == 1)
+    if (pair->collider >= 0 || drape_pair_step_fraction(pair, c->start, c->to, NULL, &keep, 1) == 1)
         return;
     of->meet = true;
     for (int a = 0; a < 4; a++) {
-        of->grown = of->grown || !c->carried[n[a]];
-        c->carried[n[a]] = true;
+        of->grown = of->grown || !c->carried[pair->node[a]];
+        c->carried[pair->node[a]] = true;
     }
 }
 
@@ -314,19 +312,21 @@ static bool layers_meet(drape_contact *c, const double *y, bool *grown)
 {
     layers of = {.contact = c};
     *grown = false;
-    bool any = false; /* free node that is not where the step began */
-    memset(c->moved, 0, (size_t)c->model->node_count * sizeof *c->moved);
+    /* Marks the nodes that are not where the step began. */
+    bool *marked = c->moved;
+    bool any = false;
+    memset(marked, 0, (size_t)(c->broad.points + c->model->collider_count) * sizeof *marked);
     for (int32_t i = 0; i < c->model->free_count; i++) {
         const size_t node = (size_t)c->model->node_of_free[i];
-        c->moved[node] = memcmp(y + 3 * node, c->start + 3 * node, 3 * sizeof *y) != 0;
-        any = any || c->moved[node];
+        marked[node] = memcmp(y + 3 * node, c->start + 3 * node, 3 * sizeof *y) != 0;
+        any = any || marked[node];
     }
     if (!any)
         return false;
     drape_contact_fill(c, y, c->path_pose, c->to);
     const drape_straight_path path = {{{.model = c->model, .x = c->start, .pose = c->start_pose},
                                        {.model = c->model, .x = c->to, .pose = c->path_pose}}};
-    drape_candidates_find(&c->broad, &path, 0, true, meet, &of);
+    drape_candidates_find(&c->broad, &path, 0, true, c->moved, meet, &of);
     *grown = of.grown;
     return of.meet;
 }

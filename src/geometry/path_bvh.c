@@ -117,12 +117,27 @@ static drape_box child_box(const drape_path_bvh *bvh, int32_t child, int end, co
     return box;
 }
 
+static bool is_marked(const drape_path_bvh *bvh, int32_t child, const bool *marked)
+{
+    const int32_t *node = bvh->node + (size_t)(child < 0 ? -1 - child : 0) * (size_t)bvh->nodes;
+    bool any = !marked;
+    if (child >= 0)
+        for (int32_t l = 0; l < bvh->branches[child].count; l++)
+            any = any || bvh->branches[child].marked[l];
+    for (int a = 0; child < 0 && !any && a < bvh->nodes; a++)
+        any = marked[node[a]];
+    return any;
+}
+
 /* Children are stored after their parent: going backwards refits them first. */
-void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const double *grow)
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
+                        const double *grow)
 {
     const double *const ends[2] = {x, y};
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
         drape_path_branch *branch = &bvh->branches[i];
+        for (int32_t l = 0; l < branch->count; l++)
+            branch->marked[l] = is_marked(bvh, branch->child[l], marked);
         for (int end = 0; end < 2 && ends[end]; end++)
             for (int32_t l = 0; l < branch->count; l++) {
                 const drape_box box = child_box(bvh, branch->child[l], end, ends[end], grow);
@@ -136,8 +151,13 @@ void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, c
 
 /* ---- Queries ---- */
 
-LANES_INLINE void traverse(const drape_path_bvh *bvh, const drape_path_box *box, int ends,
-                           drape_bvh_visit *visit, void *user)
+typedef struct query {
+    drape_path_box box;
+    int32_t marked; /* the least value of marked */
+} query;
+
+LANES_INLINE void traverse(const drape_path_bvh *bvh, const query *q, int ends, drape_bvh_visit *visit,
+                           void *user)
 {
     int32_t waiting[LANES * DRAPE_BVH_DEPTH];
     int count = 0;
@@ -150,42 +170,74 @@ LANES_INLINE void traverse(const drape_path_bvh *bvh, const drape_path_box *box,
             continue;
         }
         const drape_path_branch *branch = &bvh->branches[self];
-        const lanes_mask apart = drape_path_boxes_apart(&branch->boxes, box, ends);
+        const lanes_mask apart = drape_path_boxes_apart(&branch->boxes, &q->box, ends);
         for (int l = LANES - 1; l >= 0; l--) { /* writes always, without a branch to mispredict */
             waiting[count] = branch->child[l];
-            count += (apart[l] == 0) & (l < branch->count);
+            count += (apart[l] == 0) & (l < branch->count) & (branch->marked[l] >= q->marked);
         }
     }
 }
 
-LANES_DISPATCH static void traverse_points(const drape_path_bvh *bvh, const drape_path_box *box,
-                                           drape_bvh_visit *visit, void *user)
+LANES_DISPATCH static void traverse_points(const drape_path_bvh *bvh, const query *q, drape_bvh_visit *visit,
+                                           void *user)
 {
-    traverse(bvh, box, 1, visit, user);
+    traverse(bvh, q, 1, visit, user);
 }
 
-LANES_DISPATCH static void traverse_paths(const drape_path_bvh *bvh, const drape_path_box *box,
-                                          drape_bvh_visit *visit, void *user)
+LANES_DISPATCH static void traverse_paths(const drape_path_bvh *bvh, const query *q, drape_bvh_visit *visit,
+                                          void *user)
 {
-    traverse(bvh, box, 2, visit, user);
+    traverse(bvh, q, 2, visit, user);
 }
 
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *from, drape_bvh_visit *visit,
                           void *user)
 {
     const double *const ends[2] = {from->x, from->y};
-    drape_path_box around;
+    query q = {.marked = from->only_marked};
     for (int end = 0; end < 2 && ends[end]; end++) {
         const drape_box box = box_of(from->node, from->nodes, ends[end]);
         for (int k = 0; k < 3; k++) {
-            around.low[end][k] = box.low[k] - from->reach - (lanes){0};
-            around.high[end][k] = box.high[k] + from->reach - (lanes){0};
+            q.box.low[end][k] = box.low[k] - from->reach - (lanes){0};
+            q.box.high[end][k] = box.high[k] + from->reach - (lanes){0};
         }
     }
     if (from->y)
-        traverse_paths(bvh, &around, visit, user);
+        traverse_paths(bvh, &q, visit, user);
     else
-        traverse_points(bvh, &around, visit, user);
+        traverse_points(bvh, &q, visit, user);
+}
+
+/* ---- Without a tree ---- */
+
+/* An axis separates an element if all of its points are on the same side. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *from,
+                         const drape_path_elements *among, const bool *marked, uint8_t *side,
+                         drape_bvh_visit *visit, void *user)
+{
+    /* On which sides of the query a point is at both ends: bit 2 k is above along axis k, 2 k + 1 below. */
+    const double *const x = from->x, *const y = from->y ? from->y : from->x;
+    const drape_box first = box_of(from->node, from->nodes, x), last = box_of(from->node, from->nodes, y);
+    for (int32_t p = 0; p < among->points; p++) {
+        const size_t i = (size_t)among->point[p];
+        unsigned int sides = 0;
+        for (size_t k = 0; k < 3; k++) {
+            const unsigned int above = (unsigned int)(x[3 * i + k] > first.high[k] + from->reach) &
+                                       (unsigned int)(y[3 * i + k] > last.high[k] + from->reach),
+                               below = (unsigned int)(x[3 * i + k] < first.low[k] - from->reach) &
+                                       (unsigned int)(y[3 * i + k] < last.low[k] - from->reach);
+            sides |= (above | below << 1) << 2 * k;
+        }
+        side[i] = (uint8_t)sides;
+    }
+    for (int32_t i = 0; i < among->elements; i++) {
+        const int32_t e = among->element[i], *node = bvh->node + (size_t)e * (size_t)bvh->nodes;
+        unsigned int common = side[node[0]];
+        for (int a = 1; a < bvh->nodes; a++)
+            common &= side[node[a]];
+        if (common == 0 && (!from->only_marked || is_marked(bvh, -1 - e, marked)))
+            visit(user, e);
+    }
 }
 
 /* ---- Two trees ---- */
@@ -201,9 +253,10 @@ typedef struct meeting {
 /* Each test leads to at most LANES^2 others, one level deeper in one tree. */
 #define MEETINGS (LANES * LANES * DRAPE_BVH_DEPTH)
 
-/* Tests one child, or all, of a branch against all children of the other branch. */
+/* Tests one child, or all, of a branch against all children of the other branch. A branch that meets
+ * itself has each pair of its children once. */
 LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at, double reach, int ends,
-                          meeting *next, drape_path_bvh_meet *visit, void *user)
+                          bool itself, meeting *next, drape_path_bvh_meet *visit, void *user)
 {
     const int own = at->from, other = !own;
     const drape_path_branch *from = &tree[own]->branches[at->branch[own]],
@@ -216,12 +269,13 @@ LANES_INLINE int32_t meet(const drape_path_bvh *const tree[2], const meeting *at
         const lanes_mask apart = drape_path_boxes_apart(&to->boxes, &box, ends);
         if (apart[0] & apart[1] & apart[2] & apart[3])
             continue;
-        for (int32_t l = 0; l < to->count; l++) {
+        for (int32_t l = itself ? i : 0; l < to->count; l++) {
             const int32_t child[2] = {from->child[i], to->child[l]};
-            if (apart[l] != 0)
+            if (apart[l] != 0 || !(from->marked[i] | to->marked[l]))
                 continue;
             if (child[0] < 0 && child[1] < 0) {
-                visit(user, -1 - child[own], -1 - child[other]);
+                if (!itself || i != l)
+                    visit(user, -1 - child[own], -1 - child[other]);
                 continue;
             }
             meeting *into = &next[count++];
@@ -246,7 +300,8 @@ LANES_INLINE void join(const drape_path_bvh *const tree[2], double reach, int en
         waiting[count++] = (meeting){.lane = -1};
     while (count > 0) {
         const meeting at = waiting[--count];
-        count += meet(tree, &at, reach, ends, waiting + count, visit, user);
+        const bool itself = tree[0] == tree[1] && at.lane < 0 && at.branch[0] == at.branch[1];
+        count += meet(tree, &at, reach, ends, itself, waiting + count, visit, user);
     }
 }
 

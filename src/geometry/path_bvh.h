@@ -56,6 +56,7 @@ LANES_INLINE lanes_mask drape_path_boxes_apart(const drape_path_boxes *boxes, co
 typedef struct drape_path_branch {
     drape_path_boxes boxes; /* of the children */
     int32_t child[LANES];   /* a later branch; -1 - e: the element e */
+    int32_t marked[LANES];  /* whether an element in it is marked */
     int32_t count;          /* of children */
 } drape_path_branch;
 
@@ -73,9 +74,11 @@ typedef struct drape_path_bvh {
 drape_status drape_path_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
                                   const double *x, drape_path_bvh *bvh);
 
-/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. grow: (count) [m]
- * by which the box of each element is enlarged; NULL: by nothing. */
-void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const double *grow);
+/* Refits the boxes to the paths of the elements from x to y; y NULL: to the elements at x. marked: elements
+ * with a marked point are marked; NULL: all are. grow: (count) [m] by which the box of each element is
+ * enlarged; NULL: by nothing. */
+void drape_path_bvh_fit(drape_path_bvh *bvh, const double *x, const double *y, const bool *marked,
+                        const double *grow);
 
 /* A search for the elements that no axis separates, by more than reach at both ends, from some nodes on their
  * path. */
@@ -84,16 +87,30 @@ typedef struct drape_path_query {
     int nodes;
     const double *x, *y; /* y NULL as in the last fit */
     double reach;
+    bool only_marked; /* only marked elements */
 } drape_path_query;
 
 /* Calls visit for every such element, by increasing place. */
 void drape_path_bvh_query(const drape_path_bvh *bvh, const drape_path_query *query, drape_bvh_visit *visit,
                           void *user);
 
-/* Calls visit for every pair of elements, one of each tree, that no axis separates by more than reach at both
- * ends; both trees were fitted to the same ends. Branches that are apart are met once for all of their
- * elements, so this takes a fraction of the time of a query for each element. The order does not depend on
- * the positions. */
+/* Some elements of a tree, and the points of these elements. */
+typedef struct drape_path_elements {
+    const int32_t *element, *point;
+    int32_t elements, points;
+} drape_path_elements;
+
+/* The same for some elements of a tree that is not fitted, by a test of each of their points: for a few
+ * queries this costs less than to fit the tree. marked as in drape_path_bvh_fit; side: (largest point + 1)
+ * scratch. */
+void drape_path_bvh_scan(const drape_path_bvh *bvh, const drape_path_query *query,
+                         const drape_path_elements *among, const bool *marked, uint8_t *side,
+                         drape_bvh_visit *visit, void *user);
+
+/* Calls visit for every pair of elements, one of each tree, of which one is marked and that no axis separates
+ * by more than reach at both ends; both trees were fitted to the same ends. Branches that are apart are met
+ * once for all of their elements, so this takes a fraction of the time of a query for each element. With a ==
+ * b every pair of different elements is visited once. The order does not depend on the positions. */
 typedef void drape_path_bvh_meet(void *user, int32_t a, int32_t b);
 void drape_path_bvh_join(const drape_path_bvh *a, const drape_path_bvh *b, bool moves, double reach,
                          drape_path_bvh_meet *visit, void *user);

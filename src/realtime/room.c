@@ -476,7 +476,7 @@ static drape_status review(drape_contact *c, double t, bool *changed)
     drape_relaxed_update(relaxed, t, -drape_barrier_log(MARGIN).db * def->stiffness / def->relaxed_pressure);
     *changed = relaxed->t != before;
     if (relaxed->exempt.count > 0)
-        drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL); /* for is_pierced */
+        drape_path_bvh_fit(&c->broad.obstacles, c->x, NULL, NULL, NULL); /* for is_pierced */
     *changed = drape_relaxed_remove(relaxed, is_out, c) > 0 || *changed;
     return drape_exit_find(c, t);
 }

@@ -327,7 +327,7 @@ START_TEST(test_bounded_barrier)
 END_TEST
 
 /* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
- * s ln s and 2 s are. That of pairs inside agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
+ * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
  * comes out keeps its energy. */
 START_TEST(test_barrier)
 {
@@ -454,13 +454,19 @@ static bool stay_together(const drape_box a[2], const drape_box b[2])
     return true;
 }
 
-/* Every element that no axis separates from the query is found once, in the order of its place, also after
- * the positions have changed. */
+static bool is_marked(const bool *marked, const int32_t *edge)
+{
+    return !marked || marked[edge[0]] || marked[edge[1]];
+}
+
+/* Every element, marked if this is wanted, that no axis separates from the query is found once, in the
+ * order of its place, also after the positions have changed. */
 static void check_tree(drape_arena *arena, int32_t count)
 {
     uint64_t seed = 5;
     double x[300], y[300];
     int32_t edge[400];
+    bool marked[100];
     drape_path_bvh tree;
     fill(&seed, 1, x, 300);
     for (int i = 0; i < 400; i++)
@@ -469,13 +475,29 @@ static void check_tree(drape_arena *arena, int32_t count)
     for (int k = 0; k < 100; k++) {
         const int32_t node = k;
         const double *const ends[2] = {x, k % 2 ? y : x};
-        const drape_path_query query = {
-            .node = &node, .nodes = 1, .x = x, .y = k % 2 ? y : NULL, .reach = 0.3};
+        const bool *const marks = k % 4 < 2 ? marked : NULL;
+        const drape_path_query query = {.node = &node,
+                                        .nodes = 1,
+                                        .x = x,
+                                        .y = k % 2 ? y : NULL,
+                                        .reach = 0.3,
+                                        .only_marked = marks && k % 4 == 1};
         found f = {.count = 0};
         fill(&seed, 1, x, 300);
         fill(&seed, 1, y, 300);
-        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, NULL);
+        for (int i = 0; i < 100; i++)
+            marked[i] = next_number(&seed) > 0.8;
+        drape_path_bvh_fit(&tree, x, k % 2 ? y : NULL, marks, NULL);
         drape_path_bvh_query(&tree, &query, note, &f);
+        uint8_t side[100];
+        found scanned = {.count = 0};
+        int32_t point[100];
+        for (int32_t i = 0; i < 100; i++)
+            point[i] = i;
+        const drape_path_elements all = {tree.order, point, count, 100};
+        drape_path_bvh_scan(&tree, &query, &all, marks, side, note, &scanned);
+        ck_assert_int_eq(scanned.count, f.count);
+        ck_assert_int_eq(memcmp(scanned.elements, f.elements, (size_t)f.count * sizeof *f.elements), 0);
         for (int i = 1; i < f.count; i++)
             ck_assert_int_lt(tree.place[f.elements[i - 1]], tree.place[f.elements[i]]);
         for (int32_t e = 0; e < count; e++) {
@@ -487,7 +509,8 @@ static void check_tree(drape_arena *arena, int32_t count)
             }
             for (int i = 0; i < f.count; i++)
                 times += f.elements[i] == e;
-            ck_assert_int_eq(times, stay_together(own, box));
+            ck_assert_int_eq(times, stay_together(own, box) &&
+                                        (!query.only_marked || is_marked(marks, edge + 2 * e)));
         }
     }
 }
@@ -502,13 +525,15 @@ static void note_meeting(void *user, int32_t a, int32_t b)
     ((meetings *)user)->times[a][b]++;
 }
 
-/* Two trees, one with boxes that are enlarged, meet in every pair that no axis separates, once. */
+/* Two trees, one with boxes that are enlarged, meet in every pair with a marked element that no axis
+ * separates, once, and a tree meets itself in every such pair of different elements. */
 static void check_join(drape_arena *arena, int32_t count, int32_t others)
 {
-    static meetings met;
+    static meetings met, itself;
     uint64_t seed = 11;
     double x[300], y[300], grow[100];
     int32_t edge[200], point[100];
+    bool marked[100];
     drape_path_bvh edges, points;
     fill(&seed, 1, x, 300);
     for (int i = 0; i < 200; i++)
@@ -520,26 +545,37 @@ static void check_join(drape_arena *arena, int32_t count, int32_t others)
     ck_assert_int_eq(drape_path_bvh_build(arena, count, 2, edge, x, &edges), DRAPE_OK);
     ck_assert_int_eq(drape_path_bvh_build(arena, others, 1, point, x, &points), DRAPE_OK);
     for (int k = 0; k < 8; k++) {
-        const bool moves = k % 2;
+        const bool moves = k % 2, *marks = k % 4 < 2 ? marked : NULL;
         const double *const ends[2] = {x, moves ? y : x};
         memset(&met, 0, sizeof met);
+        memset(&itself, 0, sizeof itself);
         fill(&seed, 1, x, 300);
         fill(&seed, 1, y, 300);
-        drape_path_bvh_fit(&edges, x, moves ? y : NULL, NULL);
-        drape_path_bvh_fit(&points, x, moves ? y : NULL, grow);
+        for (int i = 0; i < 100; i++)
+            marked[i] = next_number(&seed) > 0.8;
+        drape_path_bvh_fit(&edges, x, moves ? y : NULL, marks, NULL);
+        drape_path_bvh_fit(&points, x, moves ? y : NULL, marks, grow);
         drape_path_bvh_join(&points, &edges, moves, 0.1, note_meeting, &met);
+        drape_path_bvh_join(&edges, &edges, moves, 0.2, note_meeting, &itself);
         for (int32_t a = 0; a < 100; a++)
             for (int32_t b = 0; b < 100; b++) {
                 if (b >= count) { /* there is no such edge */
-                    ck_assert(met.times[a][b] == 0);
+                    ck_assert(met.times[a][b] == 0 && itself.times[a][b] + itself.times[b][a] == 0);
                     continue;
                 }
-                drape_box of_point[2], of_edge[2];
+                drape_box of_point[2], of_edge[2], own[2];
                 for (int end = 0; end < 2; end++) {
                     of_point[end] = drape_box_of(point + a, 1, ends[end], 0.1 + grow[a]);
                     of_edge[end] = drape_box_of(edge + 2 * b, 2, ends[end], 0);
+                    own[end] = drape_box_of(edge + 2 * a, 2, ends[end], 0.2);
                 }
-                ck_assert_int_eq(met.times[a][b], a < others && stay_together(of_point, of_edge));
+                ck_assert_int_eq(met.times[a][b], a < others && stay_together(of_point, of_edge) &&
+                                                      (is_marked(marks, edge + 2 * b) || !marks || marks[a]));
+                if (a < b)
+                    ck_assert_int_eq(itself.times[a][b] + itself.times[b][a],
+                                     stay_together(own, of_edge) &&
+                                         (is_marked(marks, edge + 2 * a) || is_marked(marks, edge + 2 * b)));
+                ck_assert(a != b || itself.times[a][b] == 0);
             }
     }
 }
