@@ -2,6 +2,7 @@
 #include "io/export.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 bool drape_export_names(const drape_exporter_ops *ops, const char *name)
@@ -47,10 +48,19 @@ drape_status drape_export_open(const drape_export_def *def, const char *name, dr
     return status;
 }
 
-drape_status drape_export_begin_frame(const drape_export_def *def, const drape_frame *frame,
-                                      const char *ending)
+void drape_export_frame_name(const char *pattern, int64_t frame, char *name, size_t size)
 {
-    drape_file_name(def->whole, "frame_%06" PRId64 ".%s", frame->index, ending);
+    const char *digits = strstr(pattern, DRAPE_FRAME_DIGITS);
+    snprintf(name, size, "%.*s%0*" PRId64 "%s", (int)(digits - pattern), pattern,
+             (int)(sizeof DRAPE_FRAME_DIGITS - 1), frame, digits + sizeof DRAPE_FRAME_DIGITS - 1);
+}
+
+drape_status drape_export_begin_frame(const drape_export_def *def, const drape_frame *frame,
+                                      const char *pattern)
+{
+    char name[DRAPE_FRAME_NAME];
+    drape_export_frame_name(pattern, frame->index, name, sizeof name);
+    drape_file_name(def->whole, "%s", name);
     return drape_file_begin(def->whole);
 }
 

@@ -80,11 +80,15 @@ drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const 
 drape_status drape_export_open(const drape_export_def *def, const char *name, drape_file *file);
 
 #define DRAPE_FRAME_DIGITS "######"
+#define DRAPE_FRAME_NAME   64 /* bytes of the name of a frame's file */
 
-/* Begins def->whole as the file of a frame, frame_000000.ENDING; end it by drape_file_finish. Errors:
+/* The name of the file of a frame, by a pattern with DRAPE_FRAME_DIGITS. */
+void drape_export_frame_name(const char *pattern, int64_t frame, char *name, size_t size);
+
+/* Begins def->whole as the file of a frame, by such a pattern; end it by drape_file_finish. Errors:
  * DRAPE_E_FILE. */
 drape_status drape_export_begin_frame(const drape_export_def *def, const drape_frame *frame,
-                                      const char *ending);
+                                      const char *pattern);
 
 /* ---- Pieces of OBJ ---- */
 

@@ -9,12 +9,14 @@
 #include "io/export.h"
 #include "model/model.h"
 
+#define FRAME_NAME "frame_" DRAPE_FRAME_DIGITS ".obj"
+
 static drape_status obj_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     const drape_render_surface *surface = &def->model->surface;
     drape_obj obj = {.file = def->whole};
     (void)state;
-    drape_status status = drape_export_begin_frame(def, frame, "obj");
+    drape_status status = drape_export_begin_frame(def, frame, FRAME_NAME);
     if (status)
         return status;
     drape_file_print(obj.file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
@@ -36,6 +38,6 @@ const drape_exporter_ops drape_exporter_obj = {
              "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, with its "
              "polygons, texture coordinates and materials, 17 digits",
          .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
-    .names = {"frame_" DRAPE_FRAME_DIGITS ".obj"},
+    .names = {FRAME_NAME},
     .write = obj_write,
 };

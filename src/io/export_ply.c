@@ -8,12 +8,14 @@
 #include "io/export.h"
 #include "model/model.h"
 
+#define FRAME_NAME "frame_" DRAPE_FRAME_DIGITS ".ply"
+
 static drape_status ply_write(const drape_export_def *def, void *state, const drape_frame *frame)
 {
     const drape_render_surface *surface = &def->model->surface;
     const int32_t *node = surface->triangle;
     (void)state;
-    drape_status status = drape_export_begin_frame(def, frame, "ply");
+    drape_status status = drape_export_begin_frame(def, frame, FRAME_NAME);
     if (status)
         return status;
     drape_file_print(def->whole,
@@ -38,6 +40,6 @@ const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
               .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
-    .names = {"frame_" DRAPE_FRAME_DIGITS ".ply"},
+    .names = {FRAME_NAME},
     .write = ply_write,
 };

@@ -15,6 +15,8 @@
 
 #include "io/export.h"
 
+#define FRAME_NAME "frame_" DRAPE_FRAME_DIGITS ".vtp"
+
 #define PVD_NAME "frames.pvd"
 #define PVD_SIZE 256 /* for an entry and the last line */
 
@@ -59,8 +61,7 @@ static drape_status pvd_add(const drape_export_def *def, vtp_state *vtp, const d
 {
     const off_t end = vtp->pvd.kept - (off_t)(sizeof pvd_end - 1);
     char name[64];
-    snprintf(name, sizeof name, "frame_%06" PRId64 ".vtp", frame->index);
-    size_t size = put_entry(vtp, 0, frame->time, 0, name);
+    size_t size = put_entry(vtp, 0, frame->time, 0, def->whole->path); /* the file that was begun last */
     for (int32_t b = 0; b < def->body_count; b++) {
         format_body_name(def, b, frame->index, name);
         size = put_entry(vtp, size, frame->time, b + 1, name);
@@ -277,7 +278,7 @@ static drape_status vtp_write(const drape_export_def *def, void *state, const dr
         if (changes(&def->bodies[b]) || frame->index == 0)
             status = write_body(def, frame, b);
     if (!status)
-        status = drape_export_begin_frame(def, frame, "vtp");
+        status = drape_export_begin_frame(def, frame, FRAME_NAME);
     if (status)
         return status;
     put_part(def->whole, frame->time, list, 4, 10, "strain_max");
@@ -293,8 +294,7 @@ const drape_exporter_ops drape_exporter_vtp = {
     .state_size = sizeof(vtp_state),
     .wants_fields = true,
     .wants_bodies = true,
-    .names = {"frame_" DRAPE_FRAME_DIGITS ".vtp", PVD_NAME, "collider_#.vtp",
-              "collider_#_" DRAPE_FRAME_DIGITS ".vtp"},
+    .names = {FRAME_NAME, PVD_NAME, "collider_#.vtp", "collider_#_" DRAPE_FRAME_DIGITS ".vtp"},
     .open = vtp_open,
     .write = vtp_write,
 };

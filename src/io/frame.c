@@ -6,7 +6,6 @@
 
 #include "base/vec3.h"
 #include "colliders/body.h"
-#include "model/normals.h"
 
 /* ---- The surfaces of colliders ---- */
 

@@ -13,8 +13,8 @@
 #include "io/summary.h"
 #include "sim/sim.h"
 
-/* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer.
- * */
+/* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps, which
+ * are longer. */
 #define SAME_TIME 1e-12
 
 #define MAX_FRAMES INT64_C(1000000000000000)
@@ -472,11 +472,10 @@ static drape_status begin_files(drape_recorder *r)
 static drape_status find_frames(const drape_recorder *r)
 {
     for (size_t i = 0; i < r->output_count; i++) {
-        const char *pattern = r->outputs[i].ops->names[0], *digits = strstr(pattern, DRAPE_FRAME_DIGITS);
-        for (int64_t k = 0; digits && k < r->progress.frames; k++) {
-            char name[64];
-            snprintf(name, sizeof name, "%.*s%06" PRId64 "%s", (int)(digits - pattern), pattern, k,
-                     digits + sizeof DRAPE_FRAME_DIGITS - 1);
+        const char *pattern = r->outputs[i].ops->names[0];
+        for (int64_t k = 0; strstr(pattern, DRAPE_FRAME_DIGITS) && k < r->progress.frames; k++) {
+            char name[DRAPE_FRAME_NAME];
+            drape_export_frame_name(pattern, k, name, sizeof name);
             if (!drape_folder_wrote(r->folder, name))
                 return drape_folder_damaged(r->folder, name, "it is not in the manifest");
         }

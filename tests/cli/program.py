@@ -93,12 +93,17 @@ def meddled(*args, **how):
     return drape(*args, env=meddling(**how))
 
 
+def counted():
+    """What preload.c has counted: allocations, calls."""
+    with open("count", encoding="ascii") as file:
+        return [int(number) for number in file.read().split()]
+
+
 def calls_of(*args):
     """How many calls of a good run of these arguments preload.c counts."""
     result = meddled(*args, count="count")
     equal((result.returncode, without_warnings(result.stderr)), (0, ""), " ".join(args))
-    with open("count", encoding="ascii") as file:
-        count = int(file.read().split()[1])
+    count = counted()[1]
     os.remove("count")
     return count
 

@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 
-from program import LIMIT, PRELOAD, PROGRAM, Skip, equal, good, run_tests, without_warnings, write_scene
+from program import LIMIT, PROGRAM, Skip, counted, equal, good, meddling, run_tests, without_warnings, write_scene
 
 SAMPLE = 40  # allocations of one command
 # Words and their order, without what differs from one call to the next: numbers, which are times, "-" for a time too short to be measured, and checksums.
@@ -24,7 +24,7 @@ def call(args, number, out):
         shutil.rmtree(path, ignore_errors=True)
         if os.path.exists(path):
             os.remove(path)
-    env = dict(os.environ, LD_PRELOAD=PRELOAD, DRAPE_FAIL=str(number), DRAPE_COUNT="" if number else "count")
+    env = meddling(fail=number, count="" if number else "count")
     return subprocess.run([PROGRAM, *args], capture_output=True, timeout=LIMIT, env=env)
 
 
@@ -44,8 +44,7 @@ def check(*args, out=("out",)):
     whole = call(args, 0, out)
     equal(whole.returncode, 0, f"{args}: {whole.stderr}")
     files = written(out)
-    with open("count", encoding="ascii") as file:
-        count = int(file.read().split()[0])
+    count = counted()[0]
     stride = 1 if os.environ.get("DRAPE_ALL") else max(1, count // SAMPLE)
     first = 1 + sum(map(ord, "".join(args))) % stride
     failed = 0
