@@ -11,7 +11,6 @@
 
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 /* Of the central difference that is dE/dprogress of a term that depends on time: the cube root of epsilon,
@@ -31,7 +30,9 @@ struct drape_system {
     int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
     const bool *left_out;         /* (term_count) terms without slots in it; NULL: none */
     drape_status status;          /* of drape_system_status */
-    const char *own_reasons[DRAPE_OWN_REASONS]; /* of user-defined terms */
+    /* The reasons of user-defined terms. Not archived: a checkpoint has the names of those that were counted,
+     * which are numbered anew. */
+    const char *own_reasons[DRAPE_OWN_REASONS];
     int own_reason_count;
     drape_motion *motion;
     drape_drag_springs drag;

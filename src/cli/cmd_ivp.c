@@ -2,7 +2,6 @@
 #include "cli/lab.h"
 #include "lab/ivp.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct ivp_request {

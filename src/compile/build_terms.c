@@ -1,6 +1,5 @@
 /* build_terms.c: finds the terms of each cloth by name, resolves their parameters, has them build their
  * elements, and connects laws to the measures of their cloth. */
-#include "base/def.h"
 #include "compile/term_builder.h"
 #include "terms/terms.h"
 

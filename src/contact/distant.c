@@ -6,7 +6,6 @@
 #include "contact/clusters.h"
 
 #include <math.h>
-#include <string.h>
 
 #define STALE   0.25 /* share of its gap by which a node may move before it is evaluated again */
 #define CLUSTER DRAPE_CLUSTER_FACES /* nodes of one */

@@ -20,12 +20,6 @@ int drape_pair_points(const drape_pair *pair)
     return finders[pair->kind] ? 4 : 1;
 }
 
-/* The number of points of the first piece; the second has the others. */
-static int split_of(drape_pair_kind kind)
-{
-    return kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
-}
-
 #define D DRAPE_GAP_DOFS
 
 /* q = |u|^2 |w|^2 - (u.w)^2 with u = x1 - x0, w = x3 - x2, and its derivatives by u and w. */
@@ -199,7 +193,7 @@ bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, 
 static double least_activation(const drape_pair *pair, const drape_configuration *rest)
 {
     const drape_model *m = rest->model;
-    const int split = split_of(pair->kind);
+    const int split = drape_pair_split(pair->kind);
     double x[4][3], shortest = INFINITY, d[3];
     if (!m->untangle.given)
         return 0;
@@ -317,7 +311,7 @@ static double lead_at(const drape_pair *pair, const pair_path *path, const doubl
     double at[4];
     for (int a = 0; a < 4; a++)
         at[a] = vec3_dot(normal, path->x[a]) + t * vec3_dot(normal, path->p[a]);
-    return lead_of(split_of(pair->kind), at);
+    return lead_of(drape_pair_split(pair->kind), at);
 }
 
 /* The largest rate, per step fraction, at which the two pieces can approach each other. The common part of
@@ -333,7 +327,7 @@ static double approach_speed(const drape_pair *pair, pair_path *path)
     for (int a = 0; a < 4; a++)
         vec3_add_scaled(0.25, path->p[a], mean);
     for (int a = 0; a < 4; a++) {
-        const int second = a >= split_of(pair->kind);
+        const int second = a >= drape_pair_split(pair->kind);
         vec3_add_scaled(-1, mean, path->p[a]);
         largest[second] = fmax(largest[second], vec3_norm(path->p[a]));
     }
@@ -406,7 +400,7 @@ static double least_lead(int split, const double axis[3], double x[2][4][3], int
 
 double drape_bound_by_axes(const drape_pair *pair, const double *x, const double *y)
 {
-    const int split = split_of(pair->kind), ends = y ? 2 : 1;
+    const int split = drape_pair_split(pair->kind), ends = y ? 2 : 1;
     double at[2][4][3], axis[3], bound = -INFINITY;
     gather_relative(pair, x, x, at[0]);
     if (y)
@@ -422,7 +416,7 @@ double drape_bound_by_axes(const drape_pair *pair, const double *x, const double
 
 bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double *y, double distance)
 {
-    const int split = split_of(pair->kind), ends = y ? 2 : 1;
+    const int split = drape_pair_split(pair->kind), ends = y ? 2 : 1;
     double at[2][4][3], axis[3];
     gather_relative(pair, x, x, at[0]);
     if (y)
@@ -438,7 +432,7 @@ bool drape_bound_is_apart(const drape_pair *pair, const double *x, const double 
 
 double drape_bound_change(const drape_pair *pair, const double *x, const double *y)
 {
-    const int split = split_of(pair->kind);
+    const int split = drape_pair_split(pair->kind);
     double move[4][3], mean[3] = {0}, largest[2] = {0};
     for (int a = 0; a < 4; a++) {
         const size_t at = 3 * (size_t)pair->node[a];

@@ -28,6 +28,12 @@ typedef struct drape_pair {
     int32_t rank[3];      /* by which candidates are sorted: stage of the search, piece, place of the other */
 } drape_pair;
 
+/* The number of points of the first piece of a pair of features; the second has the others. */
+static inline int drape_pair_split(drape_pair_kind kind)
+{
+    return kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+}
+
 /* The least gap [m] that a pair may have at the end of a step: a share of its activation distance or, if that
  * is larger, the rounding of gaps, which would decide on which side a smaller gap is. A pair whose activation
  * distance is nearly as small, because it is close at rest, may approach to half of that distance. */

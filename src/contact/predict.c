@@ -1,7 +1,6 @@
 /* predict.c: see predict.h. */
 #include "contact/predict.h"
 
-#include "base/elementary.h"
 #include "base/vec3.h"
 
 #include <float.h>

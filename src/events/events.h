@@ -2,7 +2,7 @@
  * events.h: the table of event functions. An event occurs at a root of f(t, x, v) = q - bound, where q is the
  * quantity that its entry measures and the bound is one of the entry's parameters. An event function is the
  * constant drape_event_<name> of event_<name>.c. It depends on nothing but what it is given here, so that it
- * can be evaluated at any time within a step (sim/events.h).
+ * can be evaluated at any time within a step (sim/event_set.h).
  */
 #ifndef DRAPE_EVENTS_EVENTS_H
 #define DRAPE_EVENTS_EVENTS_H

@@ -1,4 +1,5 @@
 /* attach.c: pins that a host gives to colliders to carry, and takes from them. */
+#include "host/host.h"
 #include "sim/rides.h"
 
 static drape_status check_triangles(const drape_sim *sim, int32_t collider, int32_t count,
@@ -46,10 +47,9 @@ drape_status drape_sim_attach(drape_sim *sim, int32_t collider, int32_t count, c
     drape_status status = drape_sim_guard(sim, "drape_sim_attach");
     if (status)
         return status;
-    if (collider < 0 || collider >= sim->model->collider_count)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_attach: collider %d; the model has %d",
-                          (int)collider, (int)sim->model->collider_count);
-    status = drape_sim_check_nodes(sim, "drape_sim_attach", count, nodes);
+    status = drape_host_check_collider(sim, "drape_sim_attach", collider);
+    if (!status)
+        status = drape_sim_check_nodes(sim, "drape_sim_attach", count, nodes);
     if (!status)
         status = check_triangles(sim, collider, count, triangles);
     int32_t *nearest = NULL;

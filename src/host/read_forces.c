@@ -3,7 +3,6 @@
 #include "base/vec3.h"
 #include "host/host.h"
 
-#include <math.h>
 #include <string.h>
 
 /* The point of the present state; colliders move as in the last step. */

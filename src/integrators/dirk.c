@@ -30,7 +30,6 @@
 
 #include <arkode/arkode_arkstep.h>
 #include <math.h>
-#include <string.h>
 
 #define LOOSE_ORDER 3
 #define TIGHT_ORDER 5

@@ -3,7 +3,6 @@
 
 #include <arpack.h>
 #include <limits.h>
-#include <math.h>
 #include <pthread.h>
 #include <stdbool.h>
 

@@ -617,8 +617,7 @@ drape_status lab_ivp_horizon(const lab_ivp *s, bool *within, FILE *out)
     const drape_integrator_ops *verlet = lab_find_integrator("verlet");
     double dt = s->interval / STEPS;
     drape_status status = lab_ivp_admits(s, verlet) ? find_dt(s, verlet, STEPS, &dt) : DRAPE_OK;
-    const bool is_explicit =
-        lab_ivp_admits(s, verlet) && BEYOND * drape_model_duration(s->model) < MOST_STEPS * dt;
+    const bool is_explicit = lab_ivp_admits(s, verlet) && BEYOND * duration < MOST_STEPS * dt;
     settings = json_pack("{s:s, s:f}", "/integrator/method", is_explicit ? "verlet" : "trbdf2",
                          "/integrator/dt", is_explicit ? dt : s->interval / STEPS);
     if (is_explicit)

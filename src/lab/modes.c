@@ -18,7 +18,6 @@
  */
 #include "base/def.h"
 #include "base/elementary.h"
-#include "base/finite.h"
 #include "base/pi.h"
 #include "drape/lab.h"
 #include "lab/eigen.h"

@@ -14,7 +14,6 @@
  * there: b dominates, and df = s |b|^-1.
  */
 #include "base/def.h"
-#include "base/elementary.h"
 #include "base/finite.h"
 #include "drape/lab.h"
 #include "lab/eigen.h"

@@ -4,7 +4,6 @@
 #include "base/vec3.h"
 #include "model/model.h"
 
-#include <math.h>
 #include <string.h>
 
 void drape_add_normals(const double *x, const int32_t *triangle, size_t count, double *normals)

@@ -3,7 +3,6 @@
 
 #include "base/vec3.h"
 
-#include <math.h>
 #include <string.h>
 
 /* Pins that go less far apart, in their mean displacement, go as one. */

@@ -1,6 +1,8 @@
 /* islands.c: see islands.h. */
 #include "nonlinear/islands.h"
 
+#include "base/search.h"
+
 #include <string.h>
 
 drape_status drape_islands_init(drape_arena *arena, size_t n, drape_islands *islands)
@@ -9,14 +11,6 @@ drape_status drape_islands_init(drape_arena *arena, size_t n, drape_islands *isl
     islands->of = drape_arena_take(arena, n, sizeof *islands->of);
     islands->found = drape_arena_take(arena, n, sizeof *islands->found);
     return drape_arena_status(arena);
-}
-
-/* The first node of the set that has node i. Halves the path there (Tarjan & van Leeuwen 1984). */
-static int32_t first_of(int32_t *of, int32_t i)
-{
-    for (; of[i] != i; i = of[i])
-        of[i] = of[of[i]];
-    return i;
 }
 
 /* `of` is a forest at first, whose nodes point to earlier ones of their set. */
@@ -29,10 +23,8 @@ bool drape_islands_find(drape_islands *islands, const drape_pattern *pattern)
     for (int32_t i = 0; i < pattern->block_count; i++)
         of[i] = i;
     for (int32_t j = 0; j < pattern->block_count; j++)
-        for (int32_t k = pattern->block_start[j]; k < pattern->block_start[j + 1]; k++) {
-            const int32_t a = first_of(of, j), b = first_of(of, pattern->block_row[k]);
-            of[a > b ? a : b] = a > b ? b : a;
-        }
+        for (int32_t k = pattern->block_start[j]; k < pattern->block_start[j + 1]; k++)
+            drape_set_join(of, j, pattern->block_row[k]);
     islands->count = 0;
     for (int32_t i = 0; i < pattern->block_count; i++)
         of[i] = of[i] == i ? islands->count++ : of[of[i]];

@@ -42,9 +42,9 @@ static drape_status take_pattern(drape_system_matrix *m)
 
 drape_status drape_system_matrix_renew(drape_system_matrix *m)
 {
-    const double start = drape_clock_seconds();
     if (has_pattern(m))
         return DRAPE_OK;
+    const double start = drape_clock_seconds();
     m->version = -1;
     m->corrects = false;
     drape_linear_destroy(m->ops, &m->solver);

@@ -1,6 +1,7 @@
 /* exit.c: see exit.h. */
 #include "realtime/exit.h"
 
+#include "base/search.h"
 #include "base/vec3.h"
 #include "contact/barrier.h"
 #include "geometry/intersect.h"
@@ -147,13 +148,6 @@ static bool may_come_out(const drape_contact *c, int32_t collider, int32_t face)
 
 /* ---- Patches ---- */
 
-static int32_t root_of(int32_t *parent, int32_t node)
-{
-    while (parent[node] != node)
-        node = parent[node] = parent[parent[node]];
-    return node;
-}
-
 static double normal_of(const drape_contact *c, int32_t face, double normal[3])
 {
     vec3_triangle_normal(c->model->triangle + 3 * (size_t)face, c->x, normal);
@@ -216,7 +210,7 @@ enum { INSIDE = 1, PIERCED = 2, ALONG = 3, AGAINST = 4 };
 
 static drape_relaxed_patch *patch_of(const search *s, int32_t face)
 {
-    return &s->patches[root_of(s->parent, s->c->model->triangle[3 * (size_t)face])];
+    return &s->patches[drape_set_of(s->parent, s->c->model->triangle[3 * (size_t)face])];
 }
 
 /* Patches of the faces that are marked, with their normals. */
@@ -229,9 +223,8 @@ static void gather(search *s)
         s->parent[i] = i;
     for (int32_t f = 0; f < m->triangle_count; f++)
         for (size_t a = 1; s->face[f] && a < 3; a++) {
-            const int32_t *n = m->triangle + 3 * (size_t)f, one = root_of(s->parent, n[0]),
-                          other = root_of(s->parent, n[a]);
-            s->parent[one > other ? one : other] = one > other ? other : one;
+            const int32_t *n = m->triangle + 3 * (size_t)f;
+            drape_set_join(s->parent, n[0], n[a]);
         }
     for (int32_t f = 0; f < m->triangle_count; f++) {
         double normal[3];

@@ -99,7 +99,7 @@ static double factor(const drape_exempt *exempt, const drape_pair *pair)
     const drape_relaxed_set *set = (const drape_relaxed_set *)exempt;
     if (pair->collider >= 0)
         return factor_of(set, pair->collider, pair->node, drape_pair_points(pair));
-    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int split = drape_pair_split(pair->kind);
     const int32_t *one = pair->node, *other = pair->node + split;
     double largest = has_pin(set->model, other, 4 - split) ? factor_of(set, -1, one, split) : 0;
     if (has_pin(set->model, one, split))

@@ -312,7 +312,7 @@ static drape_status find_no_room(drape_contact *c, const double *x, double t, do
 static drape_status relax_pair(drape_contact *c, const drape_pair *pair, double t, int32_t *added)
 {
     const drape_model *m = c->model;
-    const int points = drape_pair_points(pair), split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int points = drape_pair_points(pair), split = drape_pair_split(pair->kind);
     bool pinned[2] = {false, false};
     for (int a = 0; a < points && pair->collider < 0; a++)
         pinned[a >= split] = pinned[a >= split] || (pair->node[a] >= 0 && m->pinned[pair->node[a]]);

@@ -7,9 +7,8 @@
  */
 #include "base/rotation.h"
 #include "base/vec3.h"
-#include "realtime/realtime.h"
-
 #include "host/place.h"
+#include "realtime/realtime.h"
 #include "sim/rides.h"
 #include "sparse/project.h"
 

@@ -129,11 +129,12 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
                  a->reading ? "" : drape_system_reason_name(sim->system, reason->reason));
         drape_archive_text(a, text, sizeof text);
         drape_archive_int64(a, &reason->count);
-        const char *name = drape_archive_has_read(a) ? drape_arena_text(sim->arena, text) : NULL;
-        if (name)
-            reason->reason = drape_system_reason(sim->system, name);
-        else if (drape_archive_has_read(a))
-            drape_archive_note(a, DRAPE_E_MEMORY);
+        if (drape_archive_has_read(a)) {
+            const char *name = drape_arena_text(sim->arena, text);
+            reason->reason = name ? drape_system_reason(sim->system, name) : DRAPE_REASON_OTHER;
+            if (!name)
+                drape_archive_note(a, DRAPE_E_MEMORY);
+        }
         sim->reason_count = drape_archive_good(a) ? i + 1 : i;
     }
     if (drape_archive_has_read(a) && !is_next_frame(sim))

@@ -2,7 +2,6 @@
 #include "sim/sim.h"
 
 #include <math.h>
-#include <string.h>
 
 double drape_sim_time(const drape_sim *sim)
 {

@@ -78,11 +78,11 @@ struct drape_sim {
     int64_t attempts;
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_left left;
-    drape_reason_total
-        reasons[DRAPE_REASON_COUNT + DRAPE_OWN_REASONS]; /* in the order of their first count */
+    /* in the order of their first count */
+    drape_reason_total reasons[DRAPE_REASON_COUNT + DRAPE_OWN_REASONS];
     int reason_count;
-    drape_reason
-        reason; /* of the last attempt in this advance. Not archived: no advance needs an earlier one */
+    /* of the last attempt in this advance. Not archived: no advance needs an earlier one */
+    drape_reason reason;
     drape_audit audit;
     const struct drape_rescue_ops *rescue;  /* of steps that fail (rescue.h); NULL: there is none */
     struct drape_realtime_memory *realtime; /* what rescue keeps, */

@@ -134,11 +134,11 @@ static drape_status factor_scaled(drape_general *g, double shift)
 {
     double low, high;
     g->lu.shift = shift;
-    drape_status status = drape_front_factors_make(&g->lu);
+    const drape_status status = drape_front_factors_make(&g->lu);
+    if (status)
+        return status;
     drape_front_factors_range(&g->lu, &low, &high);
-    if (!status && !(1 / high > ROOT) && !is_solvable(g))
-        status = DRAPE_RETRY_LINEAR;
-    return status;
+    return 1 / high > ROOT || is_solvable(g) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 /* Scales the rows and columns of a matrix so that the largest magnitude of each is about 1 (Ruiz 2001, A

@@ -4,8 +4,8 @@
  * first such matrix, because most scenes have none.
  *
  * Pivots are chosen within a diagonal tile, so rounding errors may grow without bound. On the matrices of
- * cloth in docs/speed.md they do not; where a solution misses the bound, a matrix of moderate size is
- * factored by KLU as well.
+ * cloth in bench/results/speed.csv they do not; where a solution misses the bound, a matrix of moderate size
+ * is factored by KLU as well.
  */
 #ifndef DRAPE_SOLVERS_GENERAL_H
 #define DRAPE_SOLVERS_GENERAL_H

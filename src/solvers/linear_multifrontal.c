@@ -10,9 +10,7 @@
 #include "solvers/linear.h"
 #include "solvers/rounding.h"
 
-#include <math.h>
-
-extern const drape_linear_ops drape_linear_klu, drape_linear_multifrontal;
+extern const drape_linear_ops drape_linear_klu;
 
 typedef enum have { NONE, CHOLESKY, GENERAL } have;
 
@@ -89,10 +87,10 @@ static drape_status factor_cholesky(multifrontal *s)
 {
     double low, high;
     const drape_status status = drape_front_factors_make(&s->cholesky);
+    if (status || s->fronts.pattern->n == 0)
+        return status;
     drape_front_factors_range(&s->cholesky, &low, &high);
-    return !status && s->fronts.pattern->n > 0 && !((low / high) * (low / high) > DRAPE_SINGULAR)
-               ? DRAPE_RETRY_LINEAR
-               : status;
+    return (low / high) * (low / high) > DRAPE_SINGULAR ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 static drape_status factor_any(multifrontal *s, const double *values, bool definite)

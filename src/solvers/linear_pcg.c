@@ -54,8 +54,6 @@ static drape_status create_fallback(fallback *f)
     return status;
 }
 
-extern const drape_linear_ops drape_linear_pcg;
-
 typedef struct pcg_state {
     drape_arena *arena;
     const drape_pattern *pattern;

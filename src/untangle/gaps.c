@@ -13,7 +13,7 @@
 /* Whether some node of one piece passes the sheet of the other. */
 static bool is_passing(const drape_untangler *u, const drape_pair *pair)
 {
-    const int split = pair->kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+    const int split = drape_pair_split(pair->kind);
     const int32_t sheet[2] = {u->sheets.of_point[pair->node[0]], u->sheets.of_point[pair->node[3]]};
     for (int a = 0; a < 4; a++)
         if (drape_untangle_passes(u, pair->node[a], sheet[a < split]))
@@ -82,7 +82,7 @@ static void keep_gap(drape_untangler *u, const drape_pair *found, double reach)
         /* Pieces at distance 0, such as layers that begin in one plane: the sheet with the higher number goes
          * to the side to which the normal of the other one points. */
         double *n = closest.normal;
-        const int split = pair.kind == DRAPE_PAIR_TRIANGLE ? 1 : 2;
+        const int split = drape_pair_split(pair.kind);
         const bool first = pair.node[0] < pair.node[3];
         memset(n, 0, 3 * sizeof *n);
         for (int a = first ? 0 : split; a < (first ? split : 4); a++) {

@@ -4,7 +4,6 @@
 #include "colliders/deformed.h"
 #include "geometry/mesh_distance.h"
 
-#include <float.h>
 #include <string.h>
 
 #define ENOUGH   0.5  /* share of the wanted gap: the cloth is clear if every gap is as large */
