@@ -10,8 +10,13 @@
 #include <unistd.h>
 
 #include "base/finite.h"
+#include "base/json_read.h"
+#include "io/csv.h"
 #include "io/npy.h"
 #include "io/scene_copy.h"
+#include "io/summary.h"
+
+#define SUMMARY_LIMIT (64 << 20) /* [bytes] of a summary */
 
 drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path)
 {
@@ -26,6 +31,43 @@ drape_status drape_record_scene(drape_context *ctx, const char *folder, char **p
     return drape_fail(
         ctx, DRAPE_E_FILE,
         "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY " that can be read", folder);
+}
+
+drape_status drape_record_summary(const drape_record *run, json_t **summary)
+{
+    drape_context *ctx = run->ctx;
+    char *path = drape_disk_path(ctx, run->folder, DRAPE_SUMMARY_NAME), *text = NULL;
+    size_t size = 0;
+    json_error_t error = {0};
+    *summary = NULL;
+    if (!path)
+        return DRAPE_E_MEMORY;
+    drape_status status = DRAPE_OK;
+    const int fd = drape_file_open(ctx, path);
+    if (fd >= 0)
+        status = drape_file_take(ctx, fd, path, SUMMARY_LIMIT, &text, &size);
+    else if (errno != ENOENT) /* a run that was killed has none */
+        status = DRAPE_E_FILE;
+    if (text)
+        *summary = drape_json_read(text, size, 0, &error);
+    if (text && !*summary && json_error_code(&error) == json_error_out_of_memory)
+        status = drape_fail_memory(ctx, size);
+    drape_free(ctx, text);
+    drape_free(ctx, path);
+    return status;
+}
+
+drape_status drape_record_protect(drape_context *ctx, const char *folder, const char *out)
+{
+    static const char *const inputs[] = {DRAPE_SCENE_COPY, "positions.npy", DRAPE_ENERGY_NAME,
+                                         DRAPE_STEPS_NAME, DRAPE_SUMMARY_NAME};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < sizeof inputs / sizeof *inputs && !status; i++) {
+        char *path = drape_disk_path(ctx, folder, inputs[i]);
+        status = path ? drape_file_check_named(ctx, out, path) : DRAPE_E_MEMORY;
+        drape_free(ctx, path);
+    }
+    return status;
 }
 
 /* ---- Frames ---- */

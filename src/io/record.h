@@ -5,6 +5,8 @@
 
 #include "io/file.h"
 
+#include <jansson.h>
+
 typedef struct drape_record {
     drape_context *ctx;
     char *folder;  /* without a slash at its end */
@@ -28,6 +30,14 @@ void drape_record_close(drape_record *run); /* does nothing to an empty one */
 /* Reads the positions of a frame into x (nodes x 3 [m]). Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a number is not
  * finite). */
 drape_status drape_record_read(const drape_record *run, int64_t frame, double *x);
+
+/* Reads summary.json, to be released by json_decref; *summary is NULL if there is none, as after a kill, or
+ * it is not JSON. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_record_summary(const drape_record *run, json_t **summary);
+
+/* Refuses an output that the user names if it is a file of the run in the folder, as drape_file_check_named
+ * does. */
+drape_status drape_record_protect(drape_context *ctx, const char *folder, const char *out);
 
 /* Gets one row of a table: the texts of the requested columns, valid during the call. */
 typedef void drape_row_reader(void *user, int64_t row, char *const *cells);

@@ -76,9 +76,8 @@ typedef struct page {
 static drape_status read_run(page *p, const char *folder)
 {
     drape_context *ctx = p->ctx;
-    char *scene, *text = NULL;
+    char *scene;
     size_t size = 0;
-    json_error_t error = {0};
     drape_status status = drape_record_scene(ctx, folder, &scene);
     if (!status)
         status = drape_file_read(ctx, scene, SCENE_LIMIT, &p->scene_text, &size);
@@ -87,21 +86,7 @@ static drape_status read_run(page *p, const char *folder)
     drape_free(ctx, scene);
     if (!status)
         status = drape_record_open(ctx, folder, p->model->node_count, &p->record);
-    char *path = status ? NULL : drape_disk_path(ctx, folder, DRAPE_SUMMARY_NAME);
-    if (status || !path)
-        return status ? status : DRAPE_E_MEMORY;
-    const int fd = drape_file_open(ctx, path);
-    if (fd >= 0)
-        status = drape_file_take(ctx, fd, path, SCENE_LIMIT, &text, &size);
-    else if (errno != ENOENT) /* a run that was killed has none */
-        status = DRAPE_E_FILE;
-    if (text)
-        p->summary = drape_json_read(text, size, 0, &error);
-    if (text && !p->summary && json_error_code(&error) == json_error_out_of_memory)
-        status = drape_fail_memory(ctx, size);
-    drape_free(ctx, text);
-    drape_free(ctx, path);
-    return status;
+    return status ? status : drape_record_summary(&p->record, &p->summary);
 }
 
 /* ---- Fields ---- */
@@ -474,15 +459,9 @@ static drape_status put_json(const page *p, drape_file *file)
 static drape_status create_file(drape_context *ctx, const drape_report_def *def, drape_folder **folder,
                                 drape_file *file)
 {
-    static const char *const inputs[] = {"scene.json", "positions.npy", DRAPE_ENERGY_NAME, DRAPE_STEPS_NAME,
-                                         DRAPE_SUMMARY_NAME};
     drape_status status = DRAPE_OK;
     if (def->out) {
-        for (size_t i = 0; i < sizeof inputs / sizeof *inputs && !status; i++) {
-            char path[4096];
-            snprintf(path, sizeof path, "%s/%s", def->run, inputs[i]);
-            status = drape_file_check_named(ctx, def->out, path);
-        }
+        status = drape_record_protect(ctx, def->run, def->out);
         return status ? status : drape_export_begin(ctx, NULL, def->out, file);
     }
     status = drape_folder_open(ctx, def->run, false, folder);
