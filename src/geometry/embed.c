@@ -56,12 +56,11 @@ static bool bind_smooth(const double *x, const double *normals, const double poi
     }
 }
 
-double drape_embed(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
-                   drape_embedded *to)
+void drape_embed_in(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
+                    int32_t triangle, double distance, drape_embedded *to)
 {
-    const drape_on_triangle at = drape_nearest_on(tree, x, point, INFINITY);
-    to->triangle = at.triangle;
-    memcpy(to->node, tree->node + 3 * (size_t)at.triangle, sizeof to->node);
+    to->triangle = triangle;
+    memcpy(to->node, tree->node + 3 * (size_t)triangle, sizeof to->node);
     /* Weights and height along the normal of the triangle: the components of the point in its frame. */
     const double *x0 = x + 3 * (size_t)to->node[0];
     double u[3], v[3], n[3], d[3];
@@ -78,8 +77,15 @@ double drape_embed(const drape_bvh *tree, const double *x, const double *normals
     to->flat = true;
     if (normals) {
         drape_embedded smooth = *to;
-        if (bind_smooth(x, normals, point, at.distance, &smooth))
+        if (bind_smooth(x, normals, point, distance, &smooth))
             *to = smooth;
     }
+}
+
+double drape_embed(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
+                   drape_embedded *to)
+{
+    const drape_on_triangle at = drape_nearest_on(tree, x, point, INFINITY);
+    drape_embed_in(tree, x, normals, point, at.triangle, at.distance, to);
     return at.distance;
 }

@@ -12,4 +12,8 @@
 double drape_embed(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
                    drape_embedded *to);
 
+/* The same, to a triangle that the caller has found; distance: of the point from it. */
+void drape_embed_in(const drape_bvh *tree, const double *x, const double *normals, const double point[3],
+                    int32_t triangle, double distance, drape_embedded *to);
+
 #endif
