@@ -107,6 +107,16 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
 int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 
+/* A length [m], or a share [1] of the diagonal of a cloth's box at rest. */
+typedef struct cli_length {
+    double value; /* above 0 */
+    bool is_share;
+} cli_length;
+
+/* Reads the value of an option: a length with its unit, "1mm", "0.5 cm", "2e-3 m" or "20 um"; or a share
+ * below 1, "1e-2" or "1 %". Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. */
+int cli_read_length(const cli_command *command, const char *option, const char *text, cli_length *out);
+
 /* A text of the user, such as a name, as it may be printed: shortened to 255 bytes, or to the given size. To
  * be used as in printf("%s", CLI_SHOWN(name)). */
 #define CLI_SHOWN(text) cli_shown((char[256]){0}, 256, text)
@@ -130,6 +140,22 @@ int cli_print_json(const cli_command *command, json_t *value, size_t flags);
 /* Finds a shading by its name; NULL: the default one. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was
  * printed. */
 int cli_find_shading(const cli_command *command, const char *name, int *index);
+
+/* ---- Pictures ---- */
+
+/* What the build lacks to draw; NULL: nothing. */
+extern const char *const cli_no_drawing;
+
+/* A frame of a run, its nodes coloured by distances. */
+typedef struct cli_drawing {
+    const char *out; /* the PNG */
+    char *folder;    /* of the run */
+    int64_t frame;
+    const double *distances; /* (nodes) [m] */
+} cli_drawing;
+
+/* Draws it as `drape render` does. Returns CLI_DONE, or the exit code after a line was printed. */
+int cli_draw_distances(const cli_command *command, const cli_drawing *drawing);
 
 /* ---- Ctrl-C, SIGTERM and SIGHUP: they request a stop, which all stages of a verb check for ---- */
 

@@ -56,6 +56,7 @@ typedef struct render_request {
 
 typedef struct render {
     const render_request *request;
+    const cli_drawing *drawing; /* the frame shows these distances; NULL: what the request says */
     frames_def frames;
     int width, height;
     int fine;                        /* pixels that are drawn along a side of one of the picture */
@@ -386,6 +387,27 @@ static int open_sources(render *r)
     return code;
 }
 
+/* Sets the values of the frame that was read, and the shading that shows them. */
+static int set_distances(render *r)
+{
+    static const drape_field_ops field = {.entry = {.name = "distance"}, .shown = 1e3, .shown_unit = "mm"};
+    static const drape_shading shading = {
+        .entry = {.name = "distance"}, .source = drape_shading_field_source, .field = &field};
+    drape_reel *reel = &r->sources[0].reel;
+    double *values = drape_arena_take(r->request->command.arena, reel->nodes, sizeof *values);
+    reel->values = drape_arena_take(&reel->arena, reel->nodes, sizeof *reel->values);
+    if (!values || !reel->values)
+        return cli_report(&r->request->command, CLI_FAILED);
+    r->shading = &shading;
+    drape_render_values(reel->model, r->drawing->distances, 1, values);
+    reel->with_values = true;
+    for (size_t i = 0; i < reel->nodes; i++) {
+        reel->values[i] = (float)values[i];
+        reel->high = fmax(reel->high, values[i]);
+    }
+    return CLI_GO_ON;
+}
+
 /* Before anything is simulated, so that failures to draw are reported at once. */
 static int open_painter(render *r)
 {
@@ -410,7 +432,7 @@ static int fill_sources(render *r)
     for (int i = 0; i < r->source_count && code == CLI_GO_ON; i++)
         code = r->sources[i].run.frames > 0 ? read_frames(&r->frames, &r->sources[i])
                                             : simulate(&r->frames, &r->sources[i]);
-    return code;
+    return code == CLI_GO_ON && r->drawing ? set_distances(r) : code;
 }
 
 /* Adds all frames of all runs to a framing. */
@@ -490,7 +512,7 @@ static drape_status draw(render *r, size_t k)
                                    .low = r->low,
                                    .high = r->high,
                                    .camera = camera,
-                                   .caption = r->picture ? NULL : caption};
+                                   .caption = r->picture && !r->drawing ? NULL : caption};
     return drape_painter_draw(r->painter, &picture);
 }
 
@@ -608,17 +630,17 @@ static int make(render *r)
         return cli_report(&r->request->command, CLI_FAILED);
     if (cli_interrupted() && !r->picture) /* a picture is complete */
         return cli_report_interrupted("render");
-    printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), count, count == 1 ? "" : "s",
-           r->width, r->height, r->shading->entry.name);
+    if (!r->drawing)
+        printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), count, count == 1 ? "" : "s",
+               r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }
 
-static int run(const void *command)
+static int render_request_of(const render_request *request, const cli_drawing *drawing)
 {
     static int (*const stages[])(render *) = {read_request, open_sources, open_painter,
                                               open_output,  fill_sources, set_stages};
-    const render_request *request = command;
-    render r = {.request = request, .ctx = request->command.ctx};
+    render r = {.request = request, .drawing = drawing, .ctx = request->command.ctx};
     int code = CLI_GO_ON;
     for (size_t i = 0; i < sizeof stages / sizeof *stages && code == CLI_GO_ON; i++)
         code = stages[i](&r);
@@ -637,6 +659,24 @@ static int run(const void *command)
     drape_painter_destroy(&r.painter);
     drape_offscreen_destroy(&r.offscreen);
     return code;
+}
+
+static int run(const void *command)
+{
+    return render_request_of(command, NULL);
+}
+
+const char *const cli_no_drawing = NULL;
+
+int cli_draw_distances(const cli_command *command, const cli_drawing *drawing)
+{
+    char frame[24], *operands[] = {drawing->folder};
+    snprintf(frame, sizeof frame, "%" PRId64, drawing->frame);
+    render_request request = {.command = *command, .out = drawing->out, .frame = frame};
+    request.command.operand = drawing->folder;
+    request.command.operands = operands;
+    request.command.operand_count = 1;
+    return render_request_of(&request, drawing);
 }
 
 #define AT(member) offsetof(render_request, member)

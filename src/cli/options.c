@@ -158,6 +158,30 @@ int cli_find_shading(const cli_command *command, const char *name, int *index)
 
 /* ---- Values ---- */
 
+int cli_read_length(const cli_command *command, const char *option, const char *text, cli_length *out)
+{
+    static const struct {
+        const char *name;
+        double size;
+        bool is_share;
+    } units[] = {{"m", 1, false},     {"cm", 1e-2, false}, {"mm", 1e-3, false},
+                 {"um", 1e-6, false}, {"%", 1e-2, true},   {"", 1, true}};
+    char *end;
+    const double number = strtod(text, &end);
+    const char *unit = end + strspn(end, " ");
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+        *out = (cli_length){number * units[i].size, units[i].is_share};
+        if (end > text && strcmp(unit, units[i].name) == 0 && out->value > 0 &&
+            out->value < (out->is_share ? 1 : 1e300))
+            return CLI_GO_ON;
+    }
+    return cli_misuse(
+        command->verb,
+        "--%s \"%.60s\": must be a length above 0 in m, cm, mm or um, such as 1mm, or a share of "
+        "a cloth's diagonal, above 0 and below 1, such as 1e-2 or 1%%",
+        option, text);
+}
+
 static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value)
 {
     if (!pointer || !value)

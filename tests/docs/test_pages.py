@@ -105,7 +105,7 @@ def need_programs(text):
             raise Skip(f"no {verb} in this build")
     if re.search(r"\.(mp4|webm|gif)\b", text) and not shutil.which("ffmpeg"):
         raise Skip("no ffmpeg")
-    if "drape render" in text and without_drawing():
+    if re.search("drape render|--image", text) and without_drawing():
         raise Skip(without_drawing())
 
 
