@@ -98,10 +98,10 @@ static int open_runs(compare *c)
     int code = q->within ? cli_read_length(&q->command, "within", q->within, &c->within) : CLI_GO_ON;
     if (code == CLI_GO_ON && q->command.operand_count != 2)
         code = cli_misuse("compare", "one run is given, %s; two are compared", CLI_SHOWN(q->command.operand));
-    if (code == CLI_GO_ON && q->image && cli_no_drawing)
-        code = cli_misuse("compare", "--image: %s", cli_no_drawing);
     if (code == CLI_GO_ON && q->image && (length < 5 || strcasecmp(q->image + length - 4, ".png") != 0))
         code = cli_misuse("compare", "--image \"%.200s\": its name must end in .png", q->image);
+    if (code == CLI_GO_ON && q->image && cli_no_drawing)
+        code = cli_misuse("compare", "--image: %s", cli_no_drawing);
     for (int i = 0; i < 2 && code == CLI_GO_ON; i++)
         code = open_side(&q->command, q->command.operands[i], &c->sides[i]);
     for (int i = 0; i < 2 && code == CLI_GO_ON && q->out; i++)
