@@ -12,7 +12,7 @@ import sys
 import header
 
 PROGRAM = None
-SEE = {"run": ["drape-scene(5)", "drape-render(1)", "drape-report(1)"], "list": ["drape-scene(5)"], "render": ["drape-view(1)"],
+SEE = {"run": ["drape-scene(5)", "drape-render(1)", "drape-report(1)", "drape-compare(1)"], "compare": ["drape-run(1)", "drape-render(1)"], "list": ["drape-scene(5)"], "render": ["drape-view(1)"],
        "view": ["drape-render(1)"], "merge": ["drape-tradeoff(1)", "drape-stability(1)", "drape-converge(1)"]}
 
 
@@ -81,7 +81,7 @@ def see_also(names, own):
 
 
 def verbs(overview):
-    return re.findall(r"^  (\w+) +(\S+) +(.*)$", overview, re.M)
+    return re.findall(r"^  (\w+) +(\S+(?: [A-Z]\S*)*) +(.*)$", overview, re.M)
 
 
 def overview_page(overview):

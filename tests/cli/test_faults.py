@@ -58,10 +58,11 @@ def is_whole(name, what):
 
 
 def test_report():
-    """report"""
+    """report, compare"""
     write_scene()
     good("run", "scene.json", "--out", "run", "--format", "npy")
     fill(["report", "run", "--out", "page.html"], "page.html", is_whole)
+    fill(["compare", "run", "run", "--out", "table.csv"], "table.csv", is_whole)
 
 
 def test_experiments():
@@ -116,7 +117,8 @@ def test_no_folder():
     good("run", "scene.json", "--out", "run", "--format", "npy")
     with open("file", "w", encoding="ascii") as file:
         file.write("x")
-    commands = [["run", "scene.json", "--out", "file/x"], ["report", "run", "--out", "file/x/page.html"]]
+    commands = [["run", "scene.json", "--out", "file/x"], ["report", "run", "--out", "file/x/page.html"],
+                ["compare", "run", "run", "--out", "file/x/table.csv"]]
     if drape("render", "run", "--out", "x.png", "--size", "64x48").returncode == 0:
         commands += [["render", "run", "--out", "file/x.png"], ["render", "run", "--out", "file/x"]]
     for command in commands:

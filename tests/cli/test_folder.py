@@ -294,10 +294,10 @@ def test_special_files():
     """a pipe or a device in place of a file of a run or an experiment is refused with one line: nothing waits, or reads without end"""
     write_scene()
     good(*RUN[:4], "--checkpoint-every", "1")
-    calls = [["report", "out"], ["check", "out"], ["run", "scene.json", "--resume", "--out", "out"]]
+    calls = [["report", "out"], ["check", "out"], ["run", "scene.json", "--resume", "--out", "out"], ["compare", "out", "out"]]
     if re.search(r"^ +render +RUN", good("--help"), re.M):
         calls.append(["render", "out", "--frame", "1", "--out", "x.png"])
-    reads = {"scene.json": calls, "energy.csv": calls, "positions.npy": calls, "steps.csv": [calls[0], calls[2]], "summary.json": [calls[0], calls[2]],
+    reads = {"scene.json": calls, "energy.csv": calls, "positions.npy": calls, "steps.csv": [calls[0], calls[2]], "summary.json": [calls[0], calls[2], calls[3]],
              "checkpoint.drape": [calls[2]], "manifest.jsonl": [calls[0], calls[2]]}
     for name, readers in reads.items():
         os.rename("out/" + name, "aside")

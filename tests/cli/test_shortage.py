@@ -93,10 +93,14 @@ def test_reading():
 
 
 def test_report():
-    """report"""
+    """report, compare"""
     write_scene()
     good("run", "scene.json", "--out", "run", "--format", "npy")
     check("report", "run", "--out", "page.html", out=("page.html",))
+    write_scene(mesh={"grid": "equilateral", "edges": 4, "edge_length": 0.075})
+    good("run", "scene.json", "--out", "other", "--format", "npy")
+    check("compare", "run", "other", "--out", "table.csv", out=("table.csv",))
+    check("compare", "run", "run", "--json")
 
 
 def test_lab():

@@ -264,13 +264,14 @@ def test_waiting():
 
 
 def test_asking():
-    """info, check and report: the page is whole or not there"""
+    """info, check, report and compare: the page is whole or not there"""
     touching()
     strike("info", "scene.json", last=0.6)
     strike("info", "scene.json", "--json", last=0.6)
     strike("check", "scene.json")
     good("run", "scene.json", "--out", "run", "--format", "npy")
     strike("report", "run", "--out", "page.html")
+    strike("compare", "run", "run", "--out", "table.csv")
 
 
 def test_experiments():

@@ -26,7 +26,7 @@ NAMES = {
     "long": "\u00e4" * 125,
 }
 VERBS = (("check", "{scene}"), ("info", "{scene}"), ("info", "{scene}", "--json"), ("run", "{scene}", "--out", "{out}run"), ("run", "{scene}", "--out", "{out}obj", "--format", "obj,vtp,gltf,usd"),
-         ("report", "{out}run"), ("check", "{out}run"), ("render", "{out}run", "--out", "{out}picture.png"), ("run", "{scene}", "--set", "/integrator/method=static", "--out", "{out}static"), ("modes", "{scene}", "--count", "1"),
+         ("report", "{out}run"), ("check", "{out}run"), ("compare", "{out}run", "{out}run", "--out", "{out}table.csv"), ("render", "{out}run", "--out", "{out}picture.png"), ("run", "{scene}", "--set", "/integrator/method=static", "--out", "{out}static"), ("modes", "{scene}", "--count", "1"),
          ("stability", "{scene}", "--axis", "/integrator/dt=1e-3:1e-2:2log", "--integrators", "be", "--out", "{out}map"), ("merge", "{out}map", "--out", "{out}merged"),
          ("converge", "{scene}", "--levels", "3", "--integrators", "be", "--out", "{out}orders"),
          ("stability", "{scene}", "--axis", "/integrator/{name}=1:2:2", "--out", "{out}axis"), ("run", "{scene}", "--set", "/cloth/0/{name}=1", "--out", "{out}key"))
