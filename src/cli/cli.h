@@ -143,9 +143,6 @@ int cli_find_shading(const cli_command *command, const char *name, int *index);
 
 /* ---- Pictures ---- */
 
-/* What the build lacks to draw; NULL: nothing. */
-extern const char *const cli_no_drawing;
-
 /* A frame of a run, its nodes coloured by distances. */
 typedef struct cli_drawing {
     const char *out; /* the PNG */
@@ -154,7 +151,8 @@ typedef struct cli_drawing {
     const double *distances; /* (nodes) [m] */
 } cli_drawing;
 
-/* Draws it as `drape render` does. Returns CLI_DONE, or the exit code after a line was printed. */
+/* Draws it as `drape render` does, where that verb lacks nothing. Returns CLI_DONE, or the exit code after a
+ * line was printed. */
 int cli_draw_distances(const cli_command *command, const cli_drawing *drawing);
 
 /* ---- Ctrl-C, SIGTERM and SIGHUP: they request a stop, which all stages of a verb check for ---- */

@@ -15,6 +15,8 @@
 
 #define COLUMNS "t,cloth,rms,share,distance,node,x_a,y_a,z_a,x_b,y_b,z_b\n"
 
+extern const drape_verb drape_verb_render;
+
 typedef struct compare_request {
     cli_command command;
     const char *out, *image, *within;
@@ -100,8 +102,8 @@ static int open_runs(compare *c)
         code = cli_misuse("compare", "one run is given, %s; two are compared", CLI_SHOWN(q->command.operand));
     if (code == CLI_GO_ON && q->image && (length < 5 || strcasecmp(q->image + length - 4, ".png") != 0))
         code = cli_misuse("compare", "--image \"%.200s\": its name must end in .png", q->image);
-    if (code == CLI_GO_ON && q->image && cli_no_drawing)
-        code = cli_misuse("compare", "--image: %s", cli_no_drawing);
+    if (code == CLI_GO_ON && q->image && drape_verb_render.missing)
+        code = cli_misuse("compare", "--image: %s", drape_verb_render.missing);
     for (int i = 0; i < 2 && code == CLI_GO_ON; i++)
         code = open_side(&q->command, q->command.operands[i], &c->sides[i]);
     for (int i = 0; i < 2 && code == CLI_GO_ON && q->out; i++)
@@ -154,17 +156,21 @@ static void keep_frame(compare *c)
     }
 }
 
-static drape_status read_pair(const compare *c, int64_t pair)
+static double time_of(const compare *c, int64_t pair)
+{
+    return c->sides[0].run.times[c->pairs[pair][0]];
+}
+
+typedef void deviation_measure(drape_deviation *deviation, double t, const double *x, const double *y);
+
+static drape_status read_pair(compare *c, int64_t pair, deviation_measure *measure)
 {
     drape_status status = DRAPE_OK;
     for (int i = 0; i < 2 && !status; i++)
         status = drape_record_read(&c->sides[i].run, c->pairs[pair][i], c->sides[i].x);
+    if (!status)
+        measure(&c->deviation, time_of(c, pair), c->sides[0].x, c->sides[1].x);
     return status;
-}
-
-static double time_of(const compare *c, int64_t pair)
-{
-    return c->sides[0].run.times[c->pairs[pair][0]];
 }
 
 static int compare_frames(compare *c)
@@ -180,11 +186,9 @@ static int compare_frames(compare *c)
     if (q->out)
         drape_file_put_text(&c->table, COLUMNS);
     for (int64_t i = 0; i < c->pair_count && !status && !cli_interrupted(); i++) {
-        status = read_pair(c, i);
-        if (!status) {
-            drape_deviation_add(&c->deviation, time_of(c, i), c->sides[0].x, c->sides[1].x);
+        status = read_pair(c, i, drape_deviation_add);
+        if (!status)
             keep_frame(c);
-        }
     }
     if (cli_interrupted())
         return cli_report_interrupted("compare");
@@ -198,9 +202,8 @@ static int draw(compare *c)
 {
     const drape_deviation *d = &c->deviation;
     const int64_t pair = d->cloths[drape_deviation_worst(d)].largest.rms_frame;
-    if (read_pair(c, pair))
+    if (read_pair(c, pair, drape_deviation_measure))
         return cli_report(&c->request->command, CLI_BAD_INPUT);
-    drape_deviation_measure(&c->deviation, time_of(c, pair), c->sides[0].x, c->sides[1].x);
     const cli_drawing drawing = {.out = c->request->image,
                                  .folder = c->request->command.operands[d->of],
                                  .frame = c->pairs[pair][d->of],
@@ -219,10 +222,28 @@ static const char *length_text(char text[32], double length)
 }
 #define LENGTH(length) length_text((char[32]){0}, length)
 
+/* Why the comparison is not one of all that the runs would be; "": it is. */
+static const char *partial(const compare *c, char text[DRAPE_MESSAGE_SIZE])
+{
+    const double last = time_of(c, c->pair_count - 1);
+    *text = 0;
+    for (int i = 0; i < 2 && !*text; i++) {
+        const side *s = &c->sides[i];
+        const char *name = c->request->command.operands[i];
+        if (*s->incomplete)
+            snprintf(text, DRAPE_MESSAGE_SIZE, "%s %s; its last frame is at t=%.6g s", name, s->incomplete,
+                     s->end);
+        else if (s->end > last + DRAPE_SAME * fmax(1, last))
+            snprintf(text, DRAPE_MESSAGE_SIZE,
+                     "%s is compared until t=%.6g s only, and goes on until t=%.6g s", name, last, s->end);
+    }
+    return text;
+}
+
 static void print_verdict(const compare *c)
 {
     const drape_deviation *d = &c->deviation;
-    char *const *names = c->request->command.operands;
+    char *const *names = c->request->command.operands, text[DRAPE_MESSAGE_SIZE];
     for (int32_t i = 0; i < d->model[0]->cloth_count; i++) {
         const drape_deviation_cloth *cloth = &d->cloths[i];
         const drape_apart *most = &cloth->largest;
@@ -245,10 +266,8 @@ static void print_verdict(const compare *c)
                CLI_SHOWN(names[d->of]));
     if (d->gap > DRAPE_SAME * d->model[0]->length)
         printf("at rest the meshes are up to %s apart\n", LENGTH(d->gap));
-    for (int i = 0; i < 2; i++)
-        if (*c->sides[i].incomplete)
-            printf("%s %s; its last frame is at t=%.6g s\n", CLI_SHOWN(names[i]),
-                   CLI_SHOWN(c->sides[i].incomplete), c->sides[i].end);
+    if (*partial(c, text))
+        printf("%s\n", CLI_SHOWN(text));
 }
 
 static int print_json(const compare *c)
@@ -284,17 +303,9 @@ static int print_json(const compare *c)
 static int judge(const compare *c)
 {
     const drape_deviation *d = &c->deviation;
-    const double last = time_of(c, c->pair_count - 1);
-    for (int i = 0; i < 2; i++) {
-        const side *s = &c->sides[i];
-        const char *name = c->request->command.operands[i];
-        if (*s->incomplete)
-            cli_misuse("compare", "--within: %s %s", name, s->incomplete);
-        else if (s->end > last + DRAPE_SAME * fmax(1, last))
-            cli_misuse("compare", "--within: %s is compared until t=%.6g s only, and goes on until t=%.6g s",
-                       name, last, s->end);
-        else
-            continue;
+    char text[DRAPE_MESSAGE_SIZE];
+    if (*partial(c, text)) {
+        cli_misuse("compare", "--within: %s", text);
         return CLI_FAILED;
     }
     for (int32_t i = 0; i < d->model[0]->cloth_count; i++) {

@@ -666,8 +666,6 @@ static int run(const void *command)
     return render_request_of(command, NULL);
 }
 
-const char *const cli_no_drawing = NULL;
-
 int cli_draw_distances(const cli_command *command, const cli_drawing *drawing)
 {
     char frame[24], *operands[] = {drawing->folder};

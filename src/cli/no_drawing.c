@@ -5,8 +5,6 @@
     "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and libglfw3-dev, and " \
     "rebuild with -Drender=enabled"
 
-const char *const cli_no_drawing = MISSING;
-
 int cli_draw_distances(const cli_command *command, const cli_drawing *drawing)
 {
     (void)drawing;

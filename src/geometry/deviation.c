@@ -118,8 +118,7 @@ void drape_deviation_measure(drape_deviation *d, double t, const double *x, cons
         const size_t first = (size_t)m->cloths[c].first_node, count = (size_t)m->cloths[c].mesh.node_count;
         drape_apart *now = &d->cloths[c].now;
         double sum = 0;
-        *now = (drape_apart){
-            .rms_time = t, .time = t, .rms_frame = d->frames, .frame = d->frames, .distance = -1};
+        *now = (drape_apart){.rms_time = t, .time = t, .rms_frame = d->frames, .distance = -1};
         for (size_t i = first; i < first + count; i++) {
             double place[2][3], apart[3];
             memcpy(place[d->of], motion[d->of] + 3 * i, sizeof place[0]);

@@ -19,9 +19,8 @@ typedef struct drape_apart {
     double rms, rms_time; /* [m], [s] */
     int64_t rms_frame;
     double distance, time; /* of the furthest node [m], [s] */
-    int64_t frame;
-    int32_t node;       /* its number in the model of the compared nodes, through all cloths */
-    double place[2][3]; /* [m] where it is in the first motion and in the second */
+    int32_t node;          /* its number in the model of the compared nodes, through all cloths */
+    double place[2][3];    /* [m] where it is in the first motion and in the second */
 } drape_apart;
 
 typedef struct drape_deviation_cloth {
