@@ -104,6 +104,10 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 {
     bdf2_state *s = state;
     const drape_step_equation *e = &s->common.equation;
+    if (drape_implicit_follows_impact(&s->common, in)) {
+        s->past.known = s->made.known = false;
+        return drape_implicit_euler(&s->common, in, out, h, info);
+    }
     /* The last attempt was accepted if the state that it computed is the one that this step starts from. */
     if (s->made.known && s->made.t == in->t) {
         past swap = s->past;
@@ -118,7 +122,9 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     s->common.equation.point.instant = a > 0; /* the first step is one of backward Euler */
     set_equation(s, in, a, w);
     expect(s, in, h, r);
-    drape_status status = drape_implicit_solve(&s->common, info);
+    const drape_status status = drape_implicit_solve(&s->common, info);
+    if (drape_implicit_hits(&s->common, in, status))
+        return drape_implicit_euler(&s->common, in, out, h, info);
     if (status)
         return status;
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);

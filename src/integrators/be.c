@@ -8,8 +8,6 @@
  */
 #include "integrators/implicit.h"
 
-#include <string.h>
-
 enum { PARAM_ON_FAILURE = DRAPE_NEWTON_PARAM_COUNT, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {DRAPE_NEWTON_PARAMS, [PARAM_ON_FAILURE] =
@@ -26,20 +24,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
-    drape_implicit *s = state;
-    drape_step_equation *e = &s->equation;
-    drape_implicit_backward_euler(s, in, out->t, h, 1 / (h * h));
-    e->pins_ahead = drape_implicit_pins_ahead(s, in, h); /* trbdf2 and midpoint took longer with it */
-    drape_status status = drape_implicit_solve(s, info);
-    if (status && !info->usable)
-        return status;
-    memcpy(out->x, e->x, e->nodes * sizeof *out->x);
-    memcpy(out->v, e->v_base, e->nodes * sizeof *out->v);
-    for (size_t i = 0; i < e->dofs; i++)
-        out->v[drape_step_equation_at(e, i)] = s->d[i] / h;
-    drape_ranks_fetch(e->ranks, out->v);
-    drape_implicit_audit(s, in, out, info);
-    return status;
+    return drape_implicit_euler(state, in, out, h, info);
 }
 
 const drape_integrator_ops drape_integrator_be = {

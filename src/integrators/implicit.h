@@ -9,6 +9,14 @@
 #include "integrators/integrator.h"
 #include "nonlinear/newton.h"
 
+/* What a step of backward Euler leaves to the next one. Its velocity (x1 - x0)/h is that of the middle of the
+ * step, `lag` before the end, and is the state's plus `offset`. */
+typedef struct drape_euler_end {
+    double t, lag;  /* [s]; t NAN: there is none */
+    double *offset; /* free DOFs */
+    bool impact;    /* something hit another thing in that step */
+} drape_euler_end;
+
 typedef struct drape_implicit {
     drape_step_equation equation;
     const drape_motion *motion;
@@ -18,6 +26,7 @@ typedef struct drape_implicit {
     double *history;      /* measures; NULL if no law needs rates */
     double *dissipated;   /* nodes; NULL if nothing dissipates */
     double *momentum[2];  /* nodes: at the beginning and at the end of a stage; NULL if no term has any */
+    drape_euler_end past, made; /* of the step to the present state; of the last attempt */
 } drape_implicit;
 
 /* For integrators that embed it: without a solver, or with Newton's. Errors: as for drape_newton_create. */
@@ -49,9 +58,25 @@ void drape_implicit_place(const drape_implicit *implicit, const drape_state *in,
  * until a history is set. */
 void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
 
-/* Sets the equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
-void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
-                                   double mass_weight);
+/* Sets the equation of backward Euler, of which be.c has the derivation: base, u1 = (x1 - x0)/h, q' = (q1 -
+ * q0)/h. Afterwards the nodes' u0 are in equation.v, and the free ones' h u0 in equation.inertia. */
+void drape_implicit_begin_euler(drape_implicit *implicit, const drape_state *in, double t, double h);
+
+/* The state at the solution d of that equation, and the account of work. */
+void drape_implicit_end_euler(drape_implicit *implicit, const drape_state *in, drape_state *out, double h,
+                              drape_step_info *info);
+
+/* A step of backward Euler by Newton's method. */
+drape_status drape_implicit_euler(drape_implicit *implicit, const drape_state *in, drape_state *out, double h,
+                                  drape_step_info *info);
+
+/* Methods of higher order assume forces that are smooth in a step. In an impact they are not: such a method
+ * would use the force of the impact once more after it, and cloth would rebound from a body with restitution
+ * 0. So a step in which something is hit, and the one after it, are steps of backward Euler. Whether this is
+ * one after it: */
+bool drape_implicit_follows_impact(drape_implicit *implicit, const drape_state *in);
+/* After such a method has solved its own equation with `status`: whether something was hit. */
+bool drape_implicit_hits(const drape_implicit *implicit, const drape_state *in, drape_status status);
 
 /* Once the equation has its `expected`, sets what is carried: that, and for the nodes of each cloth the mean
  * displacement by which its moved pins get ahead of theirs, h v0 or, with dv (nodes), the change of velocity

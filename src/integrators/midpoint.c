@@ -17,6 +17,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 {
     drape_implicit *s = state;
     drape_step_equation *e = &s->equation;
+    if (drape_implicit_follows_impact(s, in))
+        return drape_implicit_euler(s, in, out, h, info);
     drape_implicit_base(s, in, in->t + h / 2, h / 2);
     e->point.instant = true;
     e->point.weight = 2 / h;
@@ -24,6 +26,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h / 2 * in->v[drape_step_equation_at(e, i)];
     drape_status status = drape_implicit_solve(s, info);
+    if (drape_implicit_hits(s, in, status))
+        return drape_implicit_euler(s, in, out, h, info);
     info->error *= 2; /* d is that to the middle of the step */
     if (status)
         return status;

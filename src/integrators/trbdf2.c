@@ -20,6 +20,7 @@
 typedef struct trbdf2_state {
     drape_implicit common; /* first */
     double *g0, *xg, *vg;  /* nodes */
+    bool hits;             /* something is hit in the stage that was solved last */
     double *p0;            /* nodes: the momenta at the beginning of the step; NULL if no term has any */
 } trbdf2_state;
 
@@ -39,12 +40,13 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 }
 
 /* Solves for the end x, v of a stage, whose base, inertia, momenta and guess must be set. */
-static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v, drape_step_info *info)
+static drape_status solve_stage(trbdf2_state *s, const drape_state *in, double w, double *x, double *v, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
     e->point.weight = w;
     e->mass_weight = w * w;
-    drape_status status = drape_implicit_solve_from(&s->common, info);
+    const drape_status status = drape_implicit_solve_from(&s->common, info);
+    s->hits = drape_implicit_hits(&s->common, in, status);
     if (status)
         return status;
     memcpy(x, e->x, e->nodes * sizeof *x);
@@ -73,7 +75,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     }
     drape_implicit_momentum(c, in->t, in->x, in->v, s->p0);
     drape_implicit_set_momenta(c, w, 1, s->p0, 0, NULL);
-    drape_status status = solve_stage(s, w, s->xg, s->vg, info);
+    drape_status status = solve_stage(s, in, w, s->xg, s->vg, info);
     if (s->p0)
         memcpy(c->momentum[0], s->p0, e->nodes * sizeof *s->p0);
     drape_implicit_momentum(c, e->point.t, s->xg, s->vg, c->momentum[1]);
@@ -105,7 +107,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
     if (s->p0)
         memcpy(c->momentum[0], c->momentum[1], e->nodes * sizeof *s->p0);
     drape_implicit_set_momenta(c, w, A1, c->momentum[0], -A0, s->p0);
-    drape_status status = solve_stage(s, w, out->x, out->v, info);
+    drape_status status = solve_stage(s, in, w, out->x, out->v, info);
     drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
     if (!status)
         drape_implicit_audit_stage(c, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, s->g0, info);
@@ -116,9 +118,20 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
                          drape_step_info *info)
 {
     trbdf2_state *s = state;
+    drape_implicit *c = &s->common;
     const double w = 2 / (GAMMA * h);
-    const drape_status first = trapezoid(s, in, h, w, info);
-    return first ? first : differentiate(s, in, h, w, out, info);
+    const drape_step_info before = *info;
+    s->hits = drape_implicit_follows_impact(c, in);
+    drape_status status = DRAPE_OK;
+    if (!s->hits)
+        status = trapezoid(s, in, h, w, info);
+    if (!s->hits && !status)
+        status = differentiate(s, in, h, w, out, info);
+    if (!s->hits)
+        return status;
+    info->pin_work = before.pin_work;
+    info->dissipated = before.dissipated;
+    return drape_implicit_euler(c, in, out, h, info);
 }
 
 const drape_integrator_ops drape_integrator_trbdf2 = {
