@@ -413,6 +413,7 @@ typedef struct drape_scene_def {
     const drape_history_def *histories; /* at most 4096; NULL: none */
     size_t history_count;               /* length of histories */
     const char *gravity_history; /* name of the history that multiplies gravity; NULL: it is constant */
+    const char *accuracy; /* of drape_run_accurately: "1mm", or "1e-2" of the diagonal; NULL: none is asked */
 } drape_scene_def;
 
 /* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. Nothing
@@ -1413,6 +1414,41 @@ typedef drape_status drape_observer(void *user, const drape_event *event);
 /* Adds an observer. Observers are called in the order in which they were added; there are at most 8. Errors:
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user);
+
+/* ---- Runs of a given accuracy ---- */
+
+/* How accurate a run is, by how far it is from a coarser one: root mean square over the nodes of a cloth, the
+ * largest of all frames. */
+typedef struct drape_accuracy {
+    double asked;    /* [1] share of the smallest diagonal of the cloths' boxes at rest */
+    double error;    /* [1] estimated share of the diagonal of the cloth that is furthest off; NaN: unknown */
+    double distance; /* [m] the same */
+    double worst;    /* [m] of its node that is furthest off, likewise */
+    int32_t cloth, node; /* of which these are; numbered in the cloth */
+    double time;         /* [s] when that node is there */
+    double place[3];     /* [m] where */
+    double until;        /* [s] until then the run is as accurate as asked */
+    bool reached;        /* that is the end of the run */
+    int32_t runs;        /* that were made, this one included */
+    double seconds;      /* [s] wall-clock time of the steps of the others */
+    char method[64];     /* by which this run is made: "bdf2, dt 0.0125" */
+} drape_accuracy;
+
+/* Called before each run, with its sim, to which observers may be added, and what the runs before have shown:
+ * what observers saw of an earlier sim is superseded, and they are not called for it any more. The sim must be
+ * used by observers only. A status other than 0 ends the runs, and is returned. */
+typedef drape_status drape_run_prepare(void *user, drape_sim *sim, const drape_accuracy *before);
+
+/* Runs a model from its start for its duration until a run is as accurate as its scene asks for: chooses
+ * methods and steps, compares each run with the one before, and stops refining where that leads nowhere, since
+ * a motion may be predictable up to some time only. def: threads and the like; its method and settings are
+ * replaced; may be NULL, as prepare may. *out: the sim of the last run, which is the caller's, also after a
+ * failure that came later than its creation. Errors: DRAPE_E_ARGUMENT (NULL, no accuracy is asked, or one below
+ * what double precision gives, the scene names a method that does not converge), those of drape_sim_create and
+ * drape_sim_advance, of prepare. Thread-safety: that of the context. */
+DRAPE_API drape_status drape_run_accurately(drape_context *ctx, const drape_model *model,
+                                            const drape_sim_def *def, drape_run_prepare *prepare, void *user,
+                                            drape_sim **out, drape_accuracy *report);
 
 /* For observers: sets the text that drape_context_message returns, in the style of printf. */
 DRAPE_API void drape_context_set_message(drape_context *ctx, const char *format, ...) DRAPE_PRINTF(2, 3);

@@ -6,6 +6,7 @@
 #define DRAPE_CLI_CLI_H
 
 #include "base/arena.h"
+#include "base/distance.h"
 #include "base/registry.h"
 #include "io/record.h"
 #include "sim/sim.h"
@@ -107,15 +108,9 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
 int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 
-/* A length [m], or a share [1] of the diagonal of a cloth's box at rest. */
-typedef struct cli_length {
-    double value; /* above 0 */
-    bool is_share;
-} cli_length;
-
-/* Reads the value of an option: a length with its unit, "1mm", "0.5 cm", "2e-3 m" or "20 um"; or a share
- * below 1, "1e-2" or "1 %". Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. */
-int cli_read_length(const cli_command *command, const char *option, const char *text, cli_length *out);
+/* Reads the value of an option, a length [m] or a share [1] of the diagonal of a cloth's box at rest. Returns
+ * CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. */
+int cli_read_length(const cli_command *command, const char *option, const char *text, drape_distance *out);
 
 /* A text of the user, such as a name, as it may be printed: shortened to 255 bytes, or to the given size. To
  * be used as in printf("%s", CLI_SHOWN(name)). */

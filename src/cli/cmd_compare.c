@@ -35,7 +35,7 @@ typedef struct side {
 typedef struct compare {
     const compare_request *request;
     drape_context *ctx;
-    cli_length within;
+    drape_distance within;
     side sides[2];
     int64_t (*pairs)[2]; /* (pair_count) numbers of frames at the same time */
     int64_t pair_count;

@@ -23,6 +23,9 @@ static const cli_option scene_options[] = {
     {"duration", CLI_VALUE, "SECONDS", "simulated time", 0, 0, "/duration"},
     {"frame-rate", CLI_VALUE, "RATE", "frames per simulated second", 0, 0, "/frame_rate"},
     {"format", CLI_LIST, "A,B", "frame formats, instead of the scene's", 0, 0, "/output/formats"},
+    {"accuracy", CLI_VALUE, "LENGTH",
+     "choose method and step for this distance to the exact motion, as 1mm, or a share of the size, as 1e-2", 0, 0,
+     "/accuracy"},
     {"integrator", CLI_VALUE, "NAME", "time integrator", 0, 0, "/integrator/method"},
     {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
     {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
@@ -158,28 +161,11 @@ int cli_find_shading(const cli_command *command, const char *name, int *index)
 
 /* ---- Values ---- */
 
-int cli_read_length(const cli_command *command, const char *option, const char *text, cli_length *out)
+int cli_read_length(const cli_command *command, const char *option, const char *text, drape_distance *out)
 {
-    static const struct {
-        const char *name;
-        double size;
-        bool is_share;
-    } units[] = {{"m", 1, false},     {"cm", 1e-2, false}, {"mm", 1e-3, false},
-                 {"um", 1e-6, false}, {"%", 1e-2, true},   {"", 1, true}};
-    char *end;
-    const double number = strtod(text, &end);
-    const char *unit = end + strspn(end, " ");
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
-        *out = (cli_length){number * units[i].size, units[i].is_share};
-        if (end > text && strcmp(unit, units[i].name) == 0 && out->value > 0 &&
-            out->value < (out->is_share ? 1 : 1e300))
-            return CLI_GO_ON;
-    }
-    return cli_misuse(
-        command->verb,
-        "--%s \"%.60s\": must be a length above 0 in m, cm, mm or um, such as 1mm, or a share of "
-        "a cloth's diagonal, above 0 and below 1, such as 1e-2 or 1%%",
-        option, text);
+    return drape_distance_read(text, out) ? CLI_GO_ON
+                                        : cli_misuse(command->verb, "--%s \"%.60s\": must be %s",
+                                                     option, text, DRAPE_DISTANCE_FORM);
 }
 
 static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value)

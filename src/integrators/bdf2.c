@@ -7,8 +7,8 @@
  * (x0 - x_):
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
  * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling satisfy.
- * Hairer, Norsett & Wanner 1993, III.5. The first step, and the first one after a discontinuity, are
- * backward Euler, which the same formulas give for r = 0.
+ * Hairer, Norsett & Wanner 1993, III.5. The first step, the first one after a discontinuity, and those of
+ * impacts are backward Euler (be.c), whose state has the velocity of its time.
  *
  * The local error, by Milne's device: with c = (1 + r)^2/(6 r (1 + 2 r)) the formula is off by c h^3 x''',
  * and x0 + h v0 + h^2/2 (v0 - v_)/h_before by -(1/6 + 1/(4 r)) h^3 x''', because the difference of velocities
@@ -66,30 +66,25 @@ static void set_equation(bdf2_state *s, const drape_state *in, double a, double 
     e->mass_weight = w * w;
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
-        double dx = a > 0 ? a * s->past.dx[at] : 0, dv = a > 0 ? a * s->past.dv[at] : 0;
+        const double dx = a * s->past.dx[at], dv = a * s->past.dv[at];
         e->v_base[at] = -w * dx;
         e->inertia[i] = dx + (in->v[at] + dv) / w;
     }
     drape_implicit_momentum(c, in->t, in->x, in->v, c->momentum[0]);
-    drape_implicit_set_momenta(c, w, 1, c->momentum[0], a, a > 0 ? s->past.dp : NULL);
+    drape_implicit_set_momenta(c, w, 1, c->momentum[0], a, s->past.dp);
     e->point.history = c->history;
     if (!c->history)
         return;
     drape_implicit_measure(c, in->t, in->x, s->q0);
     for (int64_t i = 0; i < e->model->measure_count; i++)
-        c->history[i] = -w * (s->q0[i] + (a > 0 ? a * s->past.dq[i] : 0));
+        c->history[i] = -w * (s->q0[i] + a * s->past.dq[i]);
 }
 
-/* What the local error is measured by; r: h / h_before, 0 in a step of backward Euler. */
+/* What the local error is measured by; r: h / h_before. */
 static void expect(bdf2_state *s, const drape_state *in, double h, double r)
 {
     drape_step_equation *e = &s->common.equation;
-    e->expected = r > 0 ? s->expected : e->inertia;
-    e->error_share = 0.5;
-    if (!(r > 0)) {
-        drape_implicit_carry(&s->common, in, h, NULL, h);
-        return;
-    }
+    e->expected = s->expected;
     const double c = (1 + r) * (1 + r) / (6 * r * (1 + 2 * r));
     e->error_share = c / (c + 1 / 6. + 1 / (4 * r));
     for (size_t i = 0; i < e->dofs; i++) {
@@ -99,37 +94,9 @@ static void expect(bdf2_state *s, const drape_state *in, double h, double r)
     drape_implicit_carry(&s->common, in, h, s->past.dv, s->past.h);
 }
 
-static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
-                         drape_step_info *info)
+/* What the next step needs if this one is accepted. */
+static void record(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
 {
-    bdf2_state *s = state;
-    const drape_step_equation *e = &s->common.equation;
-    if (drape_implicit_follows_impact(&s->common, in)) {
-        s->past.known = s->made.known = false;
-        return drape_implicit_euler(&s->common, in, out, h, info);
-    }
-    /* The last attempt was accepted if the state that it computed is the one that this step starts from. */
-    if (s->made.known && s->made.t == in->t) {
-        past swap = s->past;
-        s->past = s->made;
-        s->made = swap;
-    }
-    s->made.known = false;
-    s->past.known = s->past.known && s->past.t == in->t;
-    double r = s->past.known ? h / s->past.h : 0;
-    double a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
-    drape_implicit_base(&s->common, in, out->t, h);
-    s->common.equation.point.instant = a > 0; /* the first step is one of backward Euler */
-    set_equation(s, in, a, w);
-    expect(s, in, h, r);
-    const drape_status status = drape_implicit_solve(&s->common, info);
-    if (drape_implicit_hits(&s->common, in, status))
-        return drape_implicit_euler(&s->common, in, out, h, info);
-    if (status)
-        return status;
-    memcpy(out->x, e->x, e->nodes * sizeof *out->x);
-    memcpy(out->v, e->v, e->nodes * sizeof *out->v);
-    /* What the next step needs if this one is accepted. */
     const drape_implicit *c = &s->common;
     s->made.t = out->t;
     s->made.h = h;
@@ -141,12 +108,56 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_implicit_momentum(c, out->t, out->x, out->v, c->momentum[1]);
     for (size_t i = 0; s->made.dp && i < c->equation.nodes; i++)
         s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
-    if (c->history) {
-        drape_implicit_measure(c, out->t, out->x, s->made.dq);
-        for (int64_t i = 0; i < c->equation.model->measure_count; i++)
-            s->made.dq[i] -= s->q0[i];
-    }
+    if (!c->history)
+        return;
+    drape_implicit_measure(c, in->t, in->x, s->q0);
+    drape_implicit_measure(c, out->t, out->x, s->made.dq);
+    for (int64_t i = 0; i < c->equation.model->measure_count; i++)
+        s->made.dq[i] -= s->q0[i];
+}
+
+/* By the formula, from a state with a past. *hits: something was hit, and the step is not made. */
+static drape_status differentiate(bdf2_state *s, const drape_state *in, drape_state *out, double h, bool *hits,
+                                  drape_step_info *info)
+{
+    drape_step_equation *e = &s->common.equation;
+    const double r = h / s->past.h, a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
+    drape_implicit_base(&s->common, in, out->t, h);
+    e->point.instant = true;
+    set_equation(s, in, a, w);
+    expect(s, in, h, r);
+    const drape_status status = drape_implicit_solve(&s->common, info);
+    *hits = drape_implicit_hits(&s->common, in, status);
+    if (status || *hits)
+        return status;
+    memcpy(out->x, e->x, e->nodes * sizeof *out->x);
+    memcpy(out->v, e->v, e->nodes * sizeof *out->v);
+    record(s, in, out, h);
     drape_implicit_audit_stage(&s->common, in->x, out->x, in->t, h, e->probe, info);
+    return status;
+}
+
+static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info)
+{
+    bdf2_state *s = state;
+    drape_status status = DRAPE_OK;
+    /* The last attempt was accepted if the state that it computed is the one that this step starts from. */
+    if (s->made.known && s->made.t == in->t) {
+        past swap = s->past;
+        s->past = s->made;
+        s->made = swap;
+    }
+    s->made.known = false;
+    s->past.known = s->past.known && s->past.t == in->t;
+    bool euler = drape_implicit_follows_impact(&s->common, in) || !s->past.known;
+    if (!euler)
+        status = differentiate(s, in, out, h, &euler, info);
+    if (!euler)
+        return status;
+    status = drape_implicit_euler(&s->common, in, out, h, info);
+    if (!status && !s->common.made.impact)
+        record(s, in, out, h);
     return status;
 }
 

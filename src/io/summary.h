@@ -24,6 +24,7 @@ typedef struct drape_summary_def {
     double wall_total;                      /* [s] of the whole run */
     double wall_output;                     /* [s] part of it spent in output */
     const drape_summary_realtime *realtime; /* NULL: there was no budget */
+    const drape_accuracy *accuracy;         /* NULL: none was asked */
 } drape_summary_def;
 
 /* Writes the file of this name in a folder, or with folder NULL the file at a path that the user named,

@@ -1,0 +1,271 @@
+/* accuracy.c: see accuracy.h. */
+#include "accuracy/accuracy.h"
+
+#include "accuracy/ladder.h"
+#include "geometry/deviation.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define LEAST    1e-8 /* shares of a diagonal: what differs by less is rounding of long sums */
+#define ROUNDING 1e-9 /* of the duration */
+
+/* One run of the model. */
+typedef struct trial {
+    struct accurate *of;
+    drape_sim *sim; /* NULL: there is none */
+    double *x;      /* (frames x nodes x 3) [m] */
+    int64_t frames, wanted; /* that there are; after which it rests, while it is compared with */
+    bool compares;  /* with the one before */
+    bool rests, given_up, over;
+} trial;
+
+typedef struct accurate {
+    drape_context *ctx;
+    const drape_model *model;
+    drape_run_prepare *prepare;
+    void *user;
+    drape_arena arena;
+    drape_deviation apart;
+    drape_ladder ladder;
+    double end;
+    int64_t most; /* frames */
+    trial trials[2], *now, *before;
+    drape_accuracy *report;
+} accurate;
+
+static double work_of(const drape_sim *sim)
+{
+    const drape_statistics s = drape_sim_statistics(sim);
+    return (double)s.residuals + 4 * (double)s.factorizations;
+}
+
+/* ---- Comparison ---- */
+
+/* Of a cloth [m]. */
+static double bound_of(const accurate *a, int32_t cloth)
+{
+    const drape_distance *asked = &a->model->accuracy;
+    return asked->is_share ? asked->value * a->apart.cloths[cloth].diagonal : asked->value;
+}
+
+/* How far the runs are apart at most, in units of what is asked of each cloth, times `accuracy` of the ladder. */
+static double largest(const accurate *a)
+{
+    double most = 0;
+    for (int32_t c = 0; c < a->model->cloth_count; c++)
+        most = fmax(most, a->apart.cloths[c].largest.rms / bound_of(a, c));
+    return a->ladder.accuracy * most;
+}
+
+static void advance_trial(trial *t, int64_t frames)
+{
+    t->wanted = frames;
+    while (!t->over && t->frames < frames) {
+        t->rests = false;
+        const drape_status status = drape_sim_advance(t->sim, t->of->end);
+        t->over = !t->rests;
+        if (status && !t->rests)
+            break;
+    }
+}
+
+/* Takes in frame k of the present run. Whether it may go on. */
+static bool compare(accurate *a, double t, int64_t k)
+{
+    const size_t n = 3 * (size_t)a->model->node_count;
+    trial *before = a->before;
+    advance_trial(before, k + 1);
+    if (before->frames <= k)
+        return true;
+    drape_deviation_add(&a->apart, t, a->now->x + n * (size_t)k, before->x + n * (size_t)k);
+    const double error = drape_ladder_error(&a->ladder, largest(a));
+    if (error <= a->ladder.accuracy)
+        a->report->until = t;
+    return largest(a) <= drape_ladder_hopeless(&a->ladder);
+}
+
+static drape_status watch(void *user, const drape_event *event)
+{
+    trial *t = user;
+    accurate *a = t->of;
+    const size_t n = 3 * (size_t)a->model->node_count;
+    if (event->kind == DRAPE_EVENT_ATTEMPT && t == a->now && work_of(t->sim) > a->ladder.rung.most)
+        t->rests = t->given_up = true;
+    if (event->kind == DRAPE_EVENT_FRAME && t->frames < a->most) {
+        memcpy(t->x + n * (size_t)t->frames, event->positions, n * sizeof *t->x);
+        t->frames++;
+        if (t == a->now && t->compares)
+            t->rests = t->rests || !compare(a, event->time, t->frames - 1);
+        else if (t == a->before)
+            t->rests = t->frames >= t->wanted;
+    }
+    return t->rests ? 1 : DRAPE_OK;
+}
+
+/* ---- Runs ---- */
+
+static void end_trial(accurate *a, trial *t)
+{
+    if (t->sim)
+        a->report->seconds += drape_sim_statistics(t->sim).wall_steps;
+    drape_sim_destroy(&t->sim);
+    drape_arena_release(&a->arena, t->x);
+    *t = (trial){.of = a};
+}
+
+/* Begins the run of the ladder's rung, as a->now. */
+static drape_status begin_trial(accurate *a, const drape_sim_def *given)
+{
+    const drape_rung *rung = &a->ladder.rung;
+    const drape_setting setting = {.name = rung->key, .number = rung->value};
+    drape_sim_def def = *given;
+    trial *t = a->now;
+    def.integrator = rung->method;
+    def.integrator_settings = &setting;
+    def.integrator_setting_count = 1;
+    def.controller = "halving";
+    *t = (trial){.of = a, .compares = a->before->frames > 0};
+    t->x = drape_arena_take(&a->arena, 3 * (size_t)a->model->node_count * (size_t)a->most, sizeof *t->x);
+    drape_status status = t->x ? drape_sim_create(a->ctx, a->model, &def, &t->sim) : DRAPE_E_MEMORY;
+    a->report->runs++;
+    snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", rung->method, rung->key, rung->value);
+    a->apart.frames = 0;
+    for (int32_t c = 0; c < a->model->cloth_count; c++)
+        a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
+    a->report->until = 0;
+    if (!status)
+        status = a->prepare ? a->prepare(a->user, t->sim, a->report) : DRAPE_OK;
+    return status ? status : drape_sim_observe(t->sim, watch, t);
+}
+
+/* What the sim's observers of the host have seen is of a run that is not the last. */
+static void leave_trial(trial *t)
+{
+    t->sim->observers[0] = watch;
+    t->sim->observer_users[0] = t;
+    t->sim->observer_count = 1;
+}
+
+static void fill_report(accurate *a)
+{
+    const int32_t c = drape_deviation_worst(&a->apart);
+    const drape_deviation_cloth *cloth = &a->apart.cloths[c];
+    const drape_apart *most = &cloth->largest;
+    const double share = drape_ladder_error(&a->ladder, 1);
+    drape_accuracy *r = a->report;
+    r->error = a->apart.frames > 0 ? share * most->rms / cloth->diagonal : NAN;
+    r->distance = a->apart.frames > 0 ? share * most->rms : NAN;
+    r->worst = a->apart.frames > 0 ? share * most->distance : NAN;
+    r->cloth = c;
+    r->node = most->node - a->model->cloths[c].first_node;
+    r->time = most->time;
+    memcpy(r->place, most->place[0], sizeof r->place);
+    r->reached = r->until >= a->end * (1 - ROUNDING);
+}
+
+static drape_status climb(accurate *a, const drape_sim_def *def)
+{
+    drape_status status = DRAPE_OK;
+    for (bool more = true; more && !status;) {
+        status = begin_trial(a, def);
+        if (status)
+            return status;
+        const double before = drape_sim_time(a->now->sim);
+        status = drape_sim_advance(a->now->sim, a->end);
+        trial *t = a->now;
+        t->over = !t->rests;
+        if (status == DRAPE_E_STOPPED && !t->rests) /* by the host */
+            return status;
+        const bool failed = status && !t->rests;
+        const double fraction = (drape_sim_time(t->sim) - before) / a->end;
+        if (!failed && a->apart.frames == t->frames && t->over && t->compares &&
+            drape_ladder_error(&a->ladder, largest(a)) <= a->ladder.accuracy)
+            a->report->until = a->end;
+        fill_report(a);
+        const drape_rung_result result = {.apart = a->apart.frames > 0 ? largest(a) : NAN,
+                                          .fraction = fmax(t->over && !failed ? 1 : fraction, ROUNDING),
+                                          .work = work_of(t->sim),
+                                          .given_up = t->given_up || failed};
+        const drape_status own = status;
+        more = drape_ladder_next(&a->ladder, &result);
+        status = DRAPE_OK;
+        if (!more && failed)
+            return own;
+        if (more && result.given_up) {
+            end_trial(a, t);
+        } else if (more) {
+            trial *old = a->before;
+            leave_trial(t);
+            end_trial(a, old);
+            a->before = t;
+            a->now = old;
+        } else if (t->rests) { /* it is as good as any will be */
+            t->compares = t->rests = false;
+            status = drape_sim_advance(t->sim, a->end);
+        }
+    }
+    return status;
+}
+
+drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
+{
+    const drape_distance *asked = &m->accuracy;
+    const drape_integrator_ops *named = NULL;
+    for (int i = 0; m->integrator_named && drape_integrators[i]; i++)
+        if (strcmp(drape_integrators[i]->entry.name, m->integrator.type) == 0)
+            named = drape_integrators[i];
+    if (!(asked->value > 0))
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "the scene asks for no accuracy");
+    if (asked->value / (asked->is_share ? 1 : m->length) < LEAST)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy",
+                             "%.3g%s is below what double precision gives: at least %.0e of a cloth's diagonal",
+                             asked->value, asked->is_share ? "" : " m", LEAST);
+    if (named && (named->projects_contact || named->steady_state))
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+                             "\"%s\" does not converge to the motion of the model, so it has no accuracy; leave "
+                             "it out, and a method is chosen",
+                             named->entry.name);
+    if (m->part)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "runs on several ranks are not repeated");
+    return DRAPE_OK;
+}
+
+drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
+                                  drape_run_prepare *prepare, void *user, drape_sim **out,
+                                  drape_accuracy *report)
+{
+    drape_sim_def own;
+    if (!ctx || !model || !out || !report)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    *report = (drape_accuracy){.error = NAN, .distance = NAN, .worst = NAN};
+    accurate a = {.ctx = ctx, .model = model, .prepare = prepare, .user = user, .report = report};
+    a.end = model->duration;
+    a.arena = drape_arena_of(ctx);
+    a.now = &a.trials[0];
+    a.before = &a.trials[1];
+    a.most = (int64_t)floor(a.end * model->frame_rate * (1 + ROUNDING)) + 2;
+    a.trials[0].of = a.trials[1].of = &a;
+    drape_sim_def_init(&own, sizeof own);
+    drape_status status = drape_accuracy_check(ctx, model);
+    if (!status)
+        status = drape_deviation_create(&a.arena, model, model, &a.apart);
+    if (!status) {
+        double size = INFINITY;
+        for (int32_t c = 0; c < model->cloth_count; c++)
+            size = fmin(size, a.apart.cloths[c].diagonal);
+        drape_ladder_init(&a.ladder, model, size,
+                          model->accuracy.value / (model->accuracy.is_share ? 1 : size));
+        report->asked = a.ladder.accuracy;
+        status = climb(&a, def ? def : &own);
+    }
+    *out = a.now->sim;
+    a.now->sim = NULL;
+    if (*out && (*out)->observer_count > 0) /* it is the host's now */
+        (*out)->observer_count--;
+    end_trial(&a, a.before);
+    drape_arena_free(&a.arena);
+    return status;
+}
