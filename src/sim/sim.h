@@ -181,10 +181,10 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
  * which measures these energies. */
 bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
-/* Settles what the residual of a step to `out` did. Work of the residual that damping took in the same step
- * is subtracted from info->dissipated. With a time budget, what the residuals so far have put into the motion
+/* Settles what the residual of a step to `out` did. Work of the residual that damping took in the same step,
+ * and what a method of own steps counts beyond what the motion lost, is subtracted from info->dissipated. With a time budget, what the residuals so far have put into the motion
  * is taken back from it: its energy never rises but by known work. */
-void drape_sim_settle_residual(drape_sim *sim, drape_state *out, drape_step_info *info);
+void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *info);
 
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
  * present state; `dissipated` and `numerical` are 0. */

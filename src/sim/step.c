@@ -35,7 +35,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     if (info->committed)
         return DRAPE_OK;
     sim->attempted_known = false;
-    drape_sim_settle_residual(sim, next, info);
+    drape_sim_settle_work(sim, next, info);
     const bool away = !info->lenient && drape_sim_ran_away(sim, next, info);
     const drape_status measured = drape_system_agree(sim->system);
     if (measured) {

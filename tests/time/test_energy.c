@@ -260,6 +260,72 @@ START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
 }
 END_TEST
 
+/* ---- What is dissipated is bounded by what the motion loses ---- */
+
+/* A method of own steps with faults: what it says of its dissipation, and kinetic energy out of nothing. */
+static const drape_integrator_ops *faulted;
+static double told, more; /* factors of the dissipation, and of the velocities in a step */
+
+static drape_status step_faulted(void *state, const drape_state *in, drape_state *out, double h,
+                                 drape_step_info *info)
+{
+    const drape_status status = faulted->step(state, in, out, h, info);
+    info->dissipated *= told;
+    for (int32_t i = 0; i < 3 * 20; i++)
+        out->v[i] *= more;
+    return status;
+}
+
+static drape_status run_faulted(const char *name, scene *s)
+{
+    *s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': "
+                    "0.4, 'height': 0.3}, 'material': {'young_modulus': 2e4, 'thickness': 1e-3, "
+                    "'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge' " DAMPED
+                    "], 'pins': [{'corner': 'top-left'}]}], 'integrator': {'method': '%s'}, 'duration': 1}",
+                    name);
+    static drape_integrator_ops method;
+    faulted = s->sim->chosen.integrator;
+    method = *faulted;
+    method.step = step_faulted;
+    s->sim->chosen.integrator = &method;
+    return drape_sim_advance(s->sim, 0.5);
+}
+
+/* The remainder may fall by what the method gains in undamped motion, 1 % of what the run received. */
+START_TEST(no_more_is_dissipated_than_the_motion_lost)
+{
+    static const char *const names[] = {"ida", "dirk", "rosenbrock", "radau"};
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        scene s;
+        told = 10;
+        more = 1;
+        ck_assert_msg(run_faulted(names[k], &s) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+        const drape_energy e = drape_sim_energy(s.sim);
+        ck_assert_int_eq(refused_for_energy(&s), 0);
+        assert_below(-e.numerical, 0.01 * drape_sim_energy_received(s.sim));
+        ck_assert_double_gt(e.dissipated, 0);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Energy out of nothing ends the run, however much is said to be dissipated. Of methods that continue from
+ * the velocities that they are given. */
+START_TEST(a_method_that_gains_is_stopped_whatever_it_says)
+{
+    static const char *const names[] = {"rosenbrock", "radau"};
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++)
+        for (int large = 0; large < 2; large++) {
+            scene s;
+            told = large ? 1e3 : 1;
+            more = 1.1;
+            ck_assert_int_lt(run_faulted(names[k], &s), 0);
+            ck_assert_int_gt(refused_for_energy(&s), 5);
+            scene_close(&s);
+        }
+}
+END_TEST
+
 /* ---- The check of energy in real time ---- */
 
 /* Where all nodes are pinned nothing but the account bounds a step of a method that chooses its own. Both
@@ -292,4 +358,5 @@ END_TEST
 SUITE("energy", the_account_of_pinned_nodes_closes, the_remainder_of_one_step_methods_has_their_order,
       be_only_takes_energy, the_remainder_of_ida_falls_with_rtol,
       dissipated_is_the_work_of_damping_in_closed_form, pins_that_lift_a_sheet_do_m_g_h,
-      completed_runs_have_gained_no_energy_from_stiff_springs)
+      completed_runs_have_gained_no_energy_from_stiff_springs, no_more_is_dissipated_than_the_motion_lost,
+      a_method_that_gains_is_stopped_whatever_it_says)
