@@ -182,8 +182,9 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
 bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
 /* Settles what the residual of a step to `out` did. Work of the residual that damping took in the same step,
- * and what a method of own steps counts beyond what the motion lost, is subtracted from info->dissipated. With a time budget, what the residuals so far have put into the motion
- * is taken back from it: its energy never rises but by known work. */
+ * and what a method of own steps counts beyond what the motion lost, is subtracted from info->dissipated.
+ * With a time budget, what the residuals so far have put into the motion is taken back from it: its energy
+ * never rises but by known work. */
 void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *info);
 
 /* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the

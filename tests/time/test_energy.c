@@ -264,13 +264,13 @@ END_TEST
 
 /* A method of own steps with faults: what it says of its dissipation, and kinetic energy out of nothing. */
 static const drape_integrator_ops *faulted;
-static double told, more; /* factors of the dissipation, and of the velocities in a step */
+static double claim, more; /* factors of the dissipation, and of the velocities in a step */
 
 static drape_status step_faulted(void *state, const drape_state *in, drape_state *out, double h,
                                  drape_step_info *info)
 {
     const drape_status status = faulted->step(state, in, out, h, info);
-    info->dissipated *= told;
+    info->dissipated *= claim;
     for (int32_t i = 0; i < 3 * 20; i++)
         out->v[i] *= more;
     return status;
@@ -297,7 +297,7 @@ START_TEST(no_more_is_dissipated_than_the_motion_lost)
     static const char *const names[] = {"ida", "dirk", "rosenbrock", "radau"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
         scene s;
-        told = 10;
+        claim = 10;
         more = 1;
         ck_assert_msg(run_faulted(names[k], &s) == DRAPE_OK, "%s", drape_context_message(s.ctx));
         const drape_energy e = drape_sim_energy(s.sim);
@@ -317,7 +317,7 @@ START_TEST(a_method_that_gains_is_stopped_whatever_it_says)
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         for (int large = 0; large < 2; large++) {
             scene s;
-            told = large ? 1e3 : 1;
+            claim = large ? 1e3 : 1;
             more = 1.1;
             ck_assert_int_lt(run_faulted(names[k], &s), 0);
             ck_assert_int_gt(refused_for_energy(&s), 5);
