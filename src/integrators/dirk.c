@@ -40,13 +40,6 @@
 #define FIRST_CHANGE    0.5
 #define ERROR_FAILS     10 /* of the error test in a step, as IDA has it */
 #define MAX_CORRECTIONS 6  /* of the undamped Newton iteration */
-/* Large steps of a stiff sheet, which the error would allow, need several new matrices in each stage; more
- * steps of half the size need fewer. Above one matrix a stage steps shrink by EFFORT_SHRINK, above half of
- * one they do not grow. At a tolerance of 1e-2 this saves a quarter to half of the time. Where contact is as
- * costly in steps of any size, they stay above EFFORT_LEAST of what the error allows. */
-#define EFFORT        1.0
-#define EFFORT_SHRINK 0.7
-#define EFFORT_LEAST  0.06
 
 enum { PARAM_FIXED_STEP = DRAPE_FIRST_ORDER_OWN, PARAM_COUNT };
 
@@ -77,7 +70,6 @@ typedef struct dirk_state {
     double far_after, last_after; /* [s] its time, and that of the last stage, after the beginning */
     double t, h;                  /* [s] that end; size of that step */
     double next;                  /* [s] size of the next step */
-    int64_t matrices;             /* factored before that step */
     double error;                 /* estimated local error of the last step relative to the tolerance */
     bool attempted;               /* a step, by this ARKODE */
 } dirk_state;
@@ -226,16 +218,6 @@ static const drape_solver_code codes[] = {
     {ARK_UNREC_RHSFUNC_ERR, DRAPE_REASON_NONFINITE},
 };
 
-/* Limits the growth of steps that need many matrices. */
-static double limit_effort(const dirk_state *s, double growth)
-{
-    const int64_t matrices = s->base.linear->factorizations - s->matrices;
-    const double effort = (double)matrices / (methods[order_of(s)].stages - 1), least = EFFORT_LEAST * growth;
-    if (effort > EFFORT)
-        return fmax(least, fmin(growth, EFFORT_SHRINK));
-    return effort > EFFORT / 2 ? fmin(growth, 1) : growth;
-}
-
 /* After a failed attempt the size does not grow. A step that was cut, to end at a stop, says nothing
  * against the size that had been chosen. */
 static void choose_next(dirk_state *s)
@@ -253,7 +235,7 @@ static void choose_next(dirk_state *s)
     double growth = drape_step_factor(error, s->error, k);
     if (growth > 1 && (attempts > 1 || growth < DRAPE_STEP_KEPT))
         growth = 1;
-    s->next = limit_effort(s, growth) * s->h;
+    s->next = drape_first_order_limit(f, methods[order_of(s)].stages - 1, 0, growth) * s->h;
     if (attempts == 1 && s->t == f->span[1])
         s->next = fmax(s->next, chosen);
     s->error = error;
@@ -278,7 +260,6 @@ static drape_reason step(drape_first_order *f, double end, double *t)
     N_VScale(1, f->y, s->before);
     N_VScale(1, f->rate, s->rate_before);
     s->far_after = s->last_after = 0;
-    s->matrices = f->linear->factorizations;
     f->counted = 0; /* ARKODE begins to count */
     int (*const set_size)(void *, sunrealtype) =
         isnan(fixed_step(s)) ? ARKStepSetInitStep : ARKStepSetFixedStep;

@@ -123,6 +123,8 @@ struct drape_first_order {
     drape_sun_newton newton;
     double *mass;             /* of the free DOFs */
     double *x, *v, *g;        /* nodes: where the residual was evaluated last; g there */
+    double t;                 /* [s] when */
+    double *fraction;         /* (node_count) scratch: that a retreat leaves of a prediction */
     const drape_ranks *ranks; /* the model's */
     double *with_copies[2];   /* (pattern.n) scratch of products of D, if there are ranks */
     double *reduced;          /* right-hand side of the reduced system (n) */
@@ -136,6 +138,7 @@ struct drape_first_order {
 
     /* Kept between steps. */
     const double *internal; /* of the last accepted state */
+    const double *before;   /* its positions (nodes) */
     double span[2];         /* [s] interval without a kink in the motion of pins and colliders */
     double reached;         /* [s] time of the library's state; NAN: it must restart */
     double from;            /* [s] time at which the last successful step began; NAN: none */
@@ -143,6 +146,8 @@ struct drape_first_order {
     double second;          /* [s] beginning of the second of simulated time in which steps are counted */
     double size, speed;     /* [m], [m/s]: of the scene, by which time is measured */
     int64_t tiny;           /* tiny steps in a row: drape_step_moves */
+    double limit;           /* [s] of the size of the next step, by the effort of the last one: of ida */
+    int64_t matrices;       /* factored before the present step; not archived */
     int64_t steps;          /* attempted in that second, except those that end an advance */
     long counted;           /* Newton iterations of the library that `work` contains already */
     drape_work work;
@@ -173,6 +178,12 @@ static inline double drape_first_order_max_step(const drape_first_order *f)
     const double max = f->values[DRAPE_FIRST_ORDER_MAX_STEP];
     return max > 0 ? max : 0; /* none is NaN */
 }
+/* For newton.retreat: shortens a prediction node by node until nothing passes through anything on the path
+ * to it from the beginning of the step. */
+bool drape_first_order_retreat(void *f, N_Vector y);
+/* The size of the next step over that of the last one, of so many stages, if the error allows it to be
+ * `growth`: less if the last one needed many matrices besides those that were due. */
+double drape_first_order_limit(const drape_first_order *f, int stages, int due, double growth);
 /* y' = (v, -M^-1 g): a callback of ARKODE; user: the drape_first_order. */
 int drape_first_order_rhs(sunrealtype t, N_Vector y, N_Vector rate, void *user);
 /* Weighted root mean square of a vector: 1 is the tolerance. */

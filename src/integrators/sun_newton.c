@@ -14,6 +14,7 @@
 
 /* Of the damped iteration. */
 #define MAX_CORRECTIONS 20
+#define FARTHEST        3.0 /* tolerances that a prediction is off: the error test of BDF 2 allows no more */
 #define CHORD_RATE      0.5 /* factors are used again while each correction is at most this of the last one */
 
 static SUNNonlinearSolverContent_Newton content_of(const drape_sun_newton *newton)
@@ -71,12 +72,15 @@ static int renew(drape_sun_newton *newton, N_Vector correction, void *library)
     return code ? code : correct(newton, correction, library);
 }
 
-/* Begins at the predicted x, with v = x': then every correction has dv = c_j dx, and the residual of
- * M v' + g alone decides how long it should be. */
-static int begin(drape_sun_newton *newton, N_Vector y, void *library)
+/* Begins at the predicted x, or short of it where that would be inside something, with v = x': then every
+ * correction has dv = c_j dx, and the residual of M v' + g alone decides how long it should be. */
+static int begin(drape_sun_newton *newton, N_Vector y, N_Vector weights, void *library)
 {
     N_VConst(0, y);
     int code = content_of(newton)->Sys(y, newton->residual, library);
+    const bool retreats = code > 0 && newton->retreat && newton->retreat(newton->user, y);
+    if (retreats)
+        code = content_of(newton)->Sys(y, newton->residual, library);
     if (code)
         return code;
     const int64_t n = newton->n / 2;
@@ -88,6 +92,8 @@ static int begin(drape_sun_newton *newton, N_Vector y, void *library)
     double *v = N_VGetArrayPointer(y) + n;
     for (int64_t i = 0; i < n; i++)
         v[i] = scale * f[i];
+    if (retreats && N_VWrmsNorm(y, weights) > FARTHEST)
+        return SUN_NLS_CONV_RECVR;
     return content_of(newton)->Sys(y, newton->residual, library);
 }
 
@@ -127,7 +133,7 @@ static int search(drape_sun_newton *newton, N_Vector y, N_Vector correction, voi
 static int solve_damped(drape_sun_newton *newton, N_Vector y, N_Vector weights, double max, void *library)
 {
     N_Vector d = newton->correction, next = newton->next;
-    int code = begin(newton, y, library);
+    int code = begin(newton, y, weights, library);
     if (!code)
         code = renew(newton, d, library);
     for (int i = 0; i < MAX_CORRECTIONS && !code; i++) {

@@ -14,9 +14,10 @@
  * IDA does not shorten corrections. It shortens the step instead until none needs to be shortened, and the
  * kinks of friction, where the slip of a node ends, need steps of a microsecond: at such a kink the matrix
  * at one side knows nothing of the other. Where the iteration fails with new factors, a damped one begins
- * anew at the prediction. Its corrections are shortened by a line search, and its matrix has an upper bound
- * of that of friction, by which corrections do not overshoot (drape_friction_bound). The step is shortened
- * only where this fails, too.
+ * anew at the prediction. A prediction knows nothing of contact that begins: nodes that it would bring into
+ * something are held back (retreat). The corrections are shortened by a line search, and the matrix has an
+ * upper bound of that of friction, by which corrections do not overshoot (drape_friction_bound). The step is
+ * shortened only where this fails, too.
  *
  * The residual of IDA is F = (x' - v, M v' + g). That of ARKODE is gamma (x' - v, v' + M^-1 g),
  * from which gamma and the masses make the first.
@@ -48,6 +49,9 @@ typedef struct drape_sun_newton {
     int (*gamma)(void *solver, sunrealtype *gamma);
     /* Whether the iteration begins with new factors. NULL: the solver decides. */
     bool (*is_due)(void *user);
+    /* After a residual at a predicted y that cannot be evaluated: adds to y, the correction so far, what
+     * makes it one that can. False: there is no such thing. NULL: nor ever is. */
+    bool (*retreat)(void *user, N_Vector y);
     void *user;
 } drape_sun_newton;
 

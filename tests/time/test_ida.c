@@ -6,6 +6,7 @@
  * waves have periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth up to rounding.
  */
 #include "faults/host.h"
+#include "integrators/first_order.h"
 #include "support/scene.h"
 
 #define LENGTH 0.6403124237432849 /* [m] diagonal, the length of the default tolerances */
@@ -472,9 +473,68 @@ START_TEST(an_advance_by_one_ulp_is_no_failure)
 }
 END_TEST
 
+/* ---- Predictions and effort ---- */
+
+static int held_back;
+
+/* Retreats, and looks at where it stands then. */
+static bool retreat_and_look(void *user, N_Vector y)
+{
+    drape_first_order *f = user;
+    drape_reason reason;
+    drape_diagnostic pair;
+    ck_assert(drape_system_crosses(f->system, f->x, f->t, &reason, &pair));
+    ck_assert(drape_first_order_retreat(f, y));
+    ck_assert(!drape_system_crosses(f->system, f->x, f->t, &reason, &pair));
+    held_back++;
+    return true;
+}
+
+/* A sheet that meets a floor, and a ball that meets the sheet, with a tolerance that allows steps many gaps
+ * long. */
+START_TEST(a_prediction_inside_a_collider_is_held_back)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': "
+        "0.3, 'orientation': 'horizontal'}, 'material': {'young_modulus': 2e4, 'thickness': 1e-3, "
+        "'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge'], 'velocity': [0, -0.5, 0]}], "
+        "'colliders': [{'type': 'plane', 'point': [0, -0.02, 0], 'normal': [0, 1, 0]}, {'type': 'sphere', "
+        "'center': [0.15, 0.4, -0.15], 'radius': 0.05, 'track': [[0.2, [0, 0, 0]], [0.5, [0, -0.36, 0]]]}], "
+        "'integrator': {'method': 'ida', 'rtol': 0.3}, 'duration': 1}");
+    held_back = 0;
+    ((drape_first_order *)s.sim->integrator)->newton.retreat = retreat_and_look;
+    scene_advance(&s, 0.4);
+    printf("# held back %d times\n", held_back);
+    ck_assert_int_gt(held_back, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* A stiff hung sheet, whose longest steps need several matrices: at 1e-2 it took 1.6 times those of 1e-3. */
+START_TEST(a_looser_tolerance_takes_no_more_matrices)
+{
+    long long matrices[2];
+    for (int k = 0; k < 2; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 13, 'rows': 13, 'width': 5, "
+            "'height': 5, 'jitter': 0.25, 'seed': 1, 'orientation': 'horizontal'}, 'material': "
+            "{'fabric': 'feng2022_6'}, 'terms': ['stretch.cst', "
+            "'bend.midedge'], 'pins': [{'nodes': [0, 12]}]}], 'integrator': {'method': 'ida', 'rtol': %g}, "
+            "'duration': 1}",
+            k ? 1e-3 : 1e-2);
+        scene_advance(&s, 0.7);
+        matrices[k] = drape_sim_statistics(s.sim).factorizations;
+        scene_close(&s);
+    }
+    printf("# %lld matrices at 1e-2, %lld at 1e-3\n", matrices[0], matrices[1]);
+    ck_assert_int_le(matrices[0], 1.2 * matrices[1]);
+}
+END_TEST
+
 SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
       atol_x_and_atol_v_are_the_weights, a_scene_far_away_takes_the_same_steps, max_step_is_kept,
       an_advance_ends_at_its_end, steps_end_at_kinks_and_start_anew,
       frames_are_what_a_run_that_stops_there_has, one_fault_is_recovered_from,
       a_fault_that_stays_ends_the_run, too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
-      an_advance_by_one_ulp_is_no_failure)
+      an_advance_by_one_ulp_is_no_failure, a_prediction_inside_a_collider_is_held_back,
+      a_looser_tolerance_takes_no_more_matrices)
