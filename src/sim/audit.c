@@ -310,9 +310,9 @@ static double take_back(const drape_model *m, double energy, double *v)
  * step and separates at its end by the mean velocity of a body that turns pushes with next to nothing, and
  * restitution times the whole displacement was 6.6 J where contact stored 0.14 and the body did 0.02. Methods
  * that choose their steps sum the power of dissipation at some points of a step, and where it begins or ends
- * within the step count several times what it took: of the steps of dirk in contact that the guard refused at
- * rtol 0.1, half were refused for it. So no more is counted than there was. What is left of a gain is one of the
- * motion: drape_sim_ran_away sees it, whatever a step says that it dissipated. */
+ * within the step count several times what it took: of the steps of dirk in contact that the guard refused
+ * at rtol 0.1, half were refused for it. So no more is counted than there was. What is left of a gain is one
+ * of the motion: drape_sim_ran_away sees it, whatever a step says that it dissipated. */
 void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *info)
 {
     const drape_audit *audit = &sim->audit;
