@@ -14,10 +14,10 @@
 /* One run of the model. */
 typedef struct trial {
     struct accurate *of;
-    drape_sim *sim; /* NULL: there is none */
-    double *x;      /* (frames x nodes x 3) [m] */
+    drape_sim *sim;         /* NULL: there is none */
+    double *x;              /* (frames x nodes x 3) [m] */
     int64_t frames, wanted; /* that there are; after which it rests, while it is compared with */
-    bool compares;  /* with the one before */
+    bool compares;          /* with the one before */
     bool rests, given_up, over;
 } trial;
 
@@ -130,7 +130,8 @@ static drape_status begin_trial(accurate *a, const drape_sim_def *given)
     t->x = drape_arena_take(&a->arena, 3 * (size_t)a->model->node_count * (size_t)a->most, sizeof *t->x);
     drape_status status = t->x ? drape_sim_create(a->ctx, a->model, &def, &t->sim) : DRAPE_E_MEMORY;
     a->report->runs++;
-    snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", rung->method, rung->key, rung->value);
+    snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", rung->method, rung->key,
+             rung->value);
     a->apart.frames = 0;
     for (int32_t c = 0; c < a->model->cloth_count; c++)
         a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
@@ -219,14 +220,16 @@ drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
     if (!(asked->value > 0))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "the scene asks for no accuracy");
     if (asked->value / (asked->is_share ? 1 : m->length) < LEAST)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy",
-                             "%.3g%s is below what double precision gives: at least %.0e of a cloth's diagonal",
-                             asked->value, asked->is_share ? "" : " m", LEAST);
+        return drape_fail_at(
+            ctx, DRAPE_E_ARGUMENT, "/accuracy",
+            "%.3g%s is below what double precision gives: at least %.0e of a cloth's diagonal", asked->value,
+            asked->is_share ? "" : " m", LEAST);
     if (named && (named->projects_contact || named->steady_state))
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/integrator/method",
-                             "\"%s\" does not converge to the motion of the model, so it has no accuracy; leave "
-                             "it out, and a method is chosen",
-                             named->entry.name);
+        return drape_fail_at(
+            ctx, DRAPE_E_ARGUMENT, "/integrator/method",
+            "\"%s\" does not converge to the motion of the model, so it has no accuracy; leave "
+            "it out, and a method is chosen",
+            named->entry.name);
     if (m->part)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "runs on several ranks are not repeated");
     return DRAPE_OK;

@@ -12,7 +12,9 @@
 #define LEAST_RTOL    1e-9
 #define CONTROL_SHARE 0.12 /* a tenth of the tolerance leaves about a tenth of the error */
 #define SAME          1.3  /* distances that differ by less do not converge */
-#define MOST_HALVINGS 8    /* that are compared with error control */
+#define LEAST_RATIO   1.41 /* of distances, at order 1/2 and 2 */
+#define MOST_RATIO    4.0
+#define MOST_HALVINGS 8 /* that are compared with error control */
 
 static double order_of(const drape_rung *rung)
 {
@@ -38,8 +40,8 @@ void drape_ladder_init(drape_ladder *l, const drape_model *m, double size, doubl
 double drape_ladder_error(const drape_ladder *l, double apart)
 {
     double share = l->rung.share;
-    if (!l->rung.controlled && !isnan(l->ratio)) /* Richardson, within orders 1/2 and 2 */
-        share = 1 / (fmin(fmax(l->ratio, M_SQRT2), 4) - 1);
+    if (!l->rung.controlled && !isnan(l->ratio)) /* Richardson */
+        share = 1 / (fmin(fmax(l->ratio, LEAST_RATIO), MOST_RATIO) - 1);
     return share * apart;
 }
 

@@ -25,18 +25,18 @@ typedef struct drape_rung {
 typedef struct drape_rung_result {
     double apart;    /* [1] largest distance to the rung before; NAN: there is none */
     double fraction; /* of the run that was made */
-    double work;     /* evaluations of the residual, and of the matrix with its factors, which count as four */
-    bool given_up;   /* its work, or it failed */
+    double work;   /* evaluations of the residual, and of the matrix with its factors, which count as four */
+    bool given_up; /* its work, or it failed */
 } drape_rung_result;
 
 typedef struct drape_ladder {
-    double accuracy; /* [1] asked */
+    double accuracy;           /* [1] asked */
     bool can_control, gave_up; /* methods with error control can run the model; they were too dear */
     drape_rung rung;           /* the present one */
     drape_rung fixed;          /* the last one of fixed steps */
-    double before;             /* [1] how far the two rungs before were apart; NAN: they were of two methods */
-    double ratio;              /* of the last two distances; NAN: unknown */
-    double least_step;         /* [s] */
+    double before;     /* [1] how far the two rungs before were apart; NAN: they were of two methods */
+    double ratio;      /* of the last two distances; NAN: unknown */
+    double least_step; /* [s] */
     bool unpredictable;
 } drape_ladder;
 

@@ -10,7 +10,7 @@ typedef struct drape_distance {
 } drape_distance;
 
 /* What is read, for messages. */
-#define DRAPE_DISTANCE_FORM                                                                                    \
+#define DRAPE_DISTANCE_FORM                                                                                  \
     "a length above 0 in m, cm, mm or um, such as 1mm, or a share of a cloth's diagonal, above 0 and below " \
     "1, such as 1e-2 or 1%"
 

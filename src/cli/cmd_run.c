@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "cli/cli_ranks.h"
 
+#include "accuracy/accuracy.h"
 #include "base/clock.h"
 #include "base/hash.h"
 #include "io/file.h"
@@ -52,6 +53,8 @@ typedef struct run {
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
     realtime realtime;                /* of --realtime */
+    bool accurate;                    /* the scene asks for an accuracy */
+    drape_accuracy accuracy;          /* which was reached */
     double start;                     /* clock at the start minus the run time before the checkpoint [s] */
     double wall;                      /* duration of the run [s] */
     const char *warned[MAX_WARNINGS]; /* names of the warnings that are printed already */
@@ -351,7 +354,8 @@ static void write_summary(run *r, drape_folder *folder, const char *path)
                                    .frames = drape_recorder_done(r->recorder).frames,
                                    .wall_total = r->wall,
                                    .wall_output = drape_recorder_done(r->recorder).seconds,
-                                   .realtime = r->request->realtime ? &r->realtime.result : NULL};
+                                   .realtime = r->request->realtime ? &r->realtime.result : NULL,
+                                   .accuracy = r->accurate ? &r->accuracy : NULL};
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
 }
 
@@ -364,7 +368,7 @@ static int open_output(run *r)
     const cli_command *command = &r->request->command;
     const bool resumed = r->recorder != NULL;
     drape_status status = DRAPE_OK;
-    if (!r->request->out || drape_recorder_done(r->recorder).finished)
+    if (!r->request->out || r->accurate || drape_recorder_done(r->recorder).finished)
         return CLI_GO_ON;
     const bool copies = !resumed && !drape_scene_copy_is(command->operand, r->request->out);
     const drape_recorder_def def = recorder_def(r);
@@ -474,6 +478,27 @@ static void print_solver(const run *r, const drape_statistics *s)
             (long long)left->above_own);
 }
 
+/* What is known of the error, and until when. */
+static void print_accuracy(const run *r)
+{
+    const drape_accuracy *a = &r->accuracy;
+    printf("accuracy  %s, the last of %d runs: ", a->method, (int)a->runs);
+    if (isnan(a->error)) {
+        puts("its error is not known");
+        return;
+    }
+    printf(
+        "%.2g of the diagonal (%.3g m) from the motion, RMS over the nodes of %s, by estimate; node %d up to "
+        "%.3g m at t=%.4g s near (%.4g, %.4g, %.4g)\n",
+        a->error, a->distance, CLI_SHOWN(r->in.model->cloths[a->cloth].name), (int)a->node, a->worst, a->time,
+        a->place[0], a->place[1], a->place[2]);
+    if (!a->reached)
+        printf("accuracy  not as asked: within %.2g until t=%.4g s only; after that runs by smaller steps "
+               "part, and "
+               "the motion is not predictable\n",
+               a->asked, a->until);
+}
+
 static void print_results(run *r)
 {
     const drape_model *model = r->in.model;
@@ -518,6 +543,8 @@ static void print_results(run *r)
     fputc('\n', stdout);
     if (r->request->realtime)
         print_realtime(&r->realtime);
+    if (r->accurate)
+        print_accuracy(r);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
                (long long)drape_recorder_done(r->recorder).frames, CLI_SHOWN(r->request->out));
@@ -552,16 +579,54 @@ static drape_status watch(void *user, const drape_event *event)
     return cli_interrupted() ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
+static drape_status begin(run *r)
+{
+    const drape_status status = drape_sim_observe(r->in.sim, watch, r);
+    cli_progress_begin(&r->progress, r->in.sim, drape_model_duration(r->in.model));
+    cli_signals_cancel(r->in.sim);
+    return status;
+}
+
+/* A drape_run_prepare: the files of the run before are replaced. */
+static drape_status begin_again(void *user, drape_sim *sim, const drape_accuracy *before)
+{
+    run *r = user;
+    const drape_recorder_def def = recorder_def(r);
+    cli_progress_clear(&r->progress);
+    if (before->runs > 1 && r->progress.on)
+        fprintf(stderr, "run %d: %s\n", (int)before->runs, before->method);
+    drape_recorder_destroy(&r->recorder);
+    r->in.sim = sim;
+    drape_status status =
+        r->request->out ? drape_recorder_create(r->in.ctx, sim, &def, &r->recorder) : DRAPE_OK;
+    if (!status && r->recorder && !drape_scene_copy_is(r->request->command.operand, r->request->out))
+        status = drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model),
+                                  r->request->command.operand, drape_recorder_folder(r->recorder));
+    return status ? status : begin(r);
+}
+
+/* The sim of the scene, by which its settings were checked, is not run. */
+static drape_status run_accurately(run *r)
+{
+    drape_sim_def def;
+    drape_sim *last = NULL, *first = r->in.sim;
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = r->request->command.threads ? r->request->command.threads : 1;
+    const drape_status status =
+        drape_run_accurately(r->in.ctx, r->in.model, &def, begin_again, r, &last, &r->accuracy);
+    r->in.sim = last ? last : first;
+    if (last)
+        drape_sim_destroy(&first);
+    return status;
+}
+
 static void advance(run *r)
 {
-    double end = drape_model_duration(r->in.model);
-    note(r, drape_sim_observe(r->in.sim, watch, r));
-    if (r->status)
-        return;
-    cli_progress_begin(&r->progress, r->in.sim, end);
-    cli_signals_cancel(r->in.sim);
-    drape_status status =
-        r->request->realtime ? run_realtime(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
+    drape_status status = r->accurate ? DRAPE_OK : begin(r);
+    if (!status)
+        status = r->accurate            ? run_accurately(r)
+                 : r->request->realtime ? run_realtime(&r->realtime, &r->in)
+                                        : drape_sim_advance(r->in.sim, drape_model_duration(r->in.model));
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
@@ -628,6 +693,21 @@ static int check_integrator(const run *r)
     return CLI_GO_ON;
 }
 
+static int check_accuracy(run *r)
+{
+    const cli_command *command = &r->request->command;
+    const char *option = r->request->realtime ? "realtime"
+                         : r->request->resume ? "resume"
+                                              : "checkpoint-every";
+    r->accurate = r->in.model->accuracy.value > 0;
+    if (!r->accurate)
+        return CLI_GO_ON;
+    if (r->request->realtime || keeps_checkpoints(r))
+        return cli_misuse(command->verb,
+                          "--%s: a scene with an accuracy is run several times, from its start", option);
+    return drape_accuracy_check(r->in.ctx, r->in.model) ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
+}
+
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds(), .realtime = {.command = &request->command}};
@@ -652,6 +732,8 @@ static int load_and_run(const run_request *request)
         return code;
     code = cli_scene_load_with(&request->command, request->command.operand,
                                request->realtime ? choose_realtime : NULL, &r.realtime, &r.in);
+    if (code == CLI_GO_ON)
+        code = check_accuracy(&r);
     if (code == CLI_GO_ON)
         code = check_integrator(&r);
     if (code == CLI_GO_ON)

@@ -24,8 +24,8 @@ static const cli_option scene_options[] = {
     {"frame-rate", CLI_VALUE, "RATE", "frames per simulated second", 0, 0, "/frame_rate"},
     {"format", CLI_LIST, "A,B", "frame formats, instead of the scene's", 0, 0, "/output/formats"},
     {"accuracy", CLI_VALUE, "LENGTH",
-     "choose method and step for this distance to the exact motion, as 1mm, or a share of the size, as 1e-2", 0, 0,
-     "/accuracy"},
+     "choose method and step for this distance to the exact motion, as 1mm, or a share of the size, as 1e-2",
+     0, 0, "/accuracy"},
     {"integrator", CLI_VALUE, "NAME", "time integrator", 0, 0, "/integrator/method"},
     {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
     {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
@@ -163,9 +163,9 @@ int cli_find_shading(const cli_command *command, const char *name, int *index)
 
 int cli_read_length(const cli_command *command, const char *option, const char *text, drape_distance *out)
 {
-    return drape_distance_read(text, out) ? CLI_GO_ON
-                                        : cli_misuse(command->verb, "--%s \"%.60s\": must be %s",
-                                                     option, text, DRAPE_DISTANCE_FORM);
+    return drape_distance_read(text, out)
+               ? CLI_GO_ON
+               : cli_misuse(command->verb, "--%s \"%.60s\": must be %s", option, text, DRAPE_DISTANCE_FORM);
 }
 
 static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value)

@@ -61,8 +61,8 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
     model->frame_rate = def->frame_rate;
     model->integrator_named = def->integrator.type != NULL;
     if (def->accuracy && !drape_distance_read(def->accuracy, &model->accuracy))
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/accuracy", "is \"%.60s\"; it must be %s", def->accuracy,
-                             DRAPE_DISTANCE_FORM);
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/accuracy", "is \"%.60s\"; it must be %s",
+                             def->accuracy, DRAPE_DISTANCE_FORM);
     model->z_up = def->up && strcmp(def->up, "z") == 0;
     DRAPE_TRY(drape_compile_choice(model, &def->integrator, default_text("/integrator/method"),
                                    &model->integrator));

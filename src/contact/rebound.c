@@ -53,7 +53,8 @@ static void push(const drape_contact *c, const drape_active_contact *contact, do
     for (int a = 0; a < closest->points && mobility > 0; a++) {
         const int32_t i = contact->pair.node[a];
         if (i < m->node_count && m->free_of_node[i] >= 0)
-            vec3_add_scaled(more * closest->c[a] / (m->mass[i] * mobility), closest->normal, v + 3 * (size_t)i);
+            vec3_add_scaled(more * closest->c[a] / (m->mass[i] * mobility), closest->normal,
+                            v + 3 * (size_t)i);
     }
 }
 
@@ -84,14 +85,16 @@ void drape_contact_rebound(const drape_contact *c, double h, const double *befor
     for (int sweep = 0; sweep < SWEEPS; sweep++)
         for (int32_t i = 0; i < c->active.count; i++) {
             const drape_active_contact *contact = &c->active.contacts[i];
-            const double e = contact->pair.collider >= 0 ? c->model->colliders[contact->pair.collider].restitution
-                                                         : def->self_restitution;
+            const double e = contact->pair.collider >= 0
+                                 ? c->model->colliders[contact->pair.collider].restitution
+                                 : def->self_restitution;
             if (!(e > 0) || contact->exempt > 0)
                 continue;
             double mean, own;
             const double approach = rate_before(c, contact, before, &mean, &own),
-                         gap = fmax(contact->gap.value - h * mean, 0), speed = sqrt(fmax(approach * approach -
-                                               2 * gap * rate_of_nodes(c, contact, acceleration), 0)),
+                         gap = fmax(contact->gap.value - h * mean, 0),
+                         speed = sqrt(fmax(
+                             approach * approach - 2 * gap * rate_of_nodes(c, contact, acceleration), 0)),
                          more = e * speed - own - rate_of_nodes(c, contact, v);
             if (approach < 0 && speed > def->restitution_velocity && more > 0)
                 push(c, contact, more, v);

@@ -117,8 +117,8 @@ static void record(bdf2_state *s, const drape_state *in, const drape_state *out,
 }
 
 /* By the formula, from a state with a past. *hits: something was hit, and the step is not made. */
-static drape_status differentiate(bdf2_state *s, const drape_state *in, drape_state *out, double h, bool *hits,
-                                  drape_step_info *info)
+static drape_status differentiate(bdf2_state *s, const drape_state *in, drape_state *out, double h,
+                                  bool *hits, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
     const double r = h / s->past.h, a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;

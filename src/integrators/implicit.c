@@ -170,7 +170,8 @@ drape_status drape_implicit_euler(drape_implicit *s, const drape_state *in, drap
                                   drape_step_info *info)
 {
     drape_implicit_begin_euler(s, in, out->t, h);
-    s->equation.pins_ahead = drape_implicit_pins_ahead(s, in, h); /* trbdf2 and midpoint took longer with it */
+    s->equation.pins_ahead =
+        drape_implicit_pins_ahead(s, in, h); /* trbdf2 and midpoint took longer with it */
     const drape_status status = drape_implicit_solve(s, info);
     if (!status || info->usable)
         drape_implicit_end_euler(s, in, out, h, info);

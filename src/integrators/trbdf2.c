@@ -40,7 +40,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 }
 
 /* Solves for the end x, v of a stage, whose base, inertia, momenta and guess must be set. */
-static drape_status solve_stage(trbdf2_state *s, const drape_state *in, double w, double *x, double *v, drape_step_info *info)
+static drape_status solve_stage(trbdf2_state *s, const drape_state *in, double w, double *x, double *v,
+                                drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
     e->point.weight = w;

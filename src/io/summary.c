@@ -178,11 +178,27 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                   {"steps_above_local_error", sim->left.above_own});
         object = drape_json_with(object, "error", error);
     }
-    json_t *wall = DRAPE_JSON_REALS(
-        json_object(), {"total", def->wall_total}, {"setup", s.wall_setup}, {"steps", s.wall_steps},
-        {"residual", s.wall_residual}, {"jacobian", s.wall_jacobian}, {"factor", s.wall_factor},
-        {"solve", s.wall_solve}, {"contact", s.wall_contact}, {"output", def->wall_output});
+    const drape_accuracy *accuracy = def->accuracy;
+    json_t *wall = DRAPE_JSON_REALS(json_object(), {"total", def->wall_total}, {"setup", s.wall_setup},
+                                    {"steps", s.wall_steps + (accuracy ? accuracy->seconds : 0)},
+                                    {"residual", s.wall_residual}, {"jacobian", s.wall_jacobian},
+                                    {"factor", s.wall_factor}, {"solve", s.wall_solve},
+                                    {"contact", s.wall_contact}, {"output", def->wall_output});
     object = drape_json_with(object, "wall_s", wall);
+    if (accuracy) { /* the error told, a share of the diagonal, and what else is known of it */
+        json_t *place = json_array();
+        for (int k = 0; k < 3; k++)
+            place = drape_json_append(place, drape_json_number(accuracy->place[k]));
+        json_t *of = DRAPE_JSON_COUNTS(json_object(), {"runs", accuracy->runs}, {"node", accuracy->node});
+        of = drape_json_with(of, "reached", json_boolean(accuracy->reached));
+        of = DRAPE_JSON_REALS(of, {"asked", accuracy->asked}, {"distance", accuracy->distance},
+                              {"worst", accuracy->worst}, {"time", accuracy->time},
+                              {"until", accuracy->until}, {"earlier_runs_s", accuracy->seconds});
+        of = drape_json_with(of, "cloth", drape_json_text(model->cloths[accuracy->cloth].name));
+        of = drape_json_with(of, "method", drape_json_text(accuracy->method));
+        object = drape_json_with(object, "accuracy", drape_json_number(accuracy->error));
+        object = drape_json_with(object, "accuracy_of", drape_json_with(of, "place", place));
+    }
     json_t *energy = DRAPE_JSON_REALS(json_object(), {"kinetic", e.kinetic}, {"elastic", e.elastic},
                                       {"gravity", e.gravity}, {"contact", e.contact},
                                       {"dissipated", e.dissipated}, {"numerical", e.numerical});

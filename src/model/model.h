@@ -3,8 +3,8 @@
 #ifndef DRAPE_MODEL_MODEL_H
 #define DRAPE_MODEL_MODEL_H
 
-#include "base/distance.h"
 #include "base/arena.h"
+#include "base/distance.h"
 #include "base/ranks.h"
 #include "mesh/mesh.h"
 #include "mesh/sequence.h"
@@ -441,7 +441,7 @@ struct drape_model {
     double length;        /* diagonal of the rest bounding box [m], > 0 */
     double gravity[3];    /* [m/s2] */
     drape_choice integrator, controller;
-    bool integrator_named; /* by the scene */
+    bool integrator_named;   /* by the scene */
     drape_distance accuracy; /* asked of runs; value 0: none */
     double duration, frame_rate;
     char **formats;

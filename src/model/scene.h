@@ -61,6 +61,7 @@ typedef struct drape_scene_key {
     drape_param param; /* without kind and range if the shape has no values */
     drape_scene_shape shape;
     bool literal;                           /* TEXT: param.derived is itself the default */
+    bool or_number;                         /* TEXT: a number is taken for its text */
     bool optional;                          /* OBJECT: may be omitted although it contains a required key */
     const double *vector;                   /* VECTOR: the default, if its three numbers differ */
     size_t offset;                          /* offset in the def of its object */

@@ -208,7 +208,14 @@ static drape_status read_one(reader *r, const drape_scene_key *key, json_t *valu
 {
     drape_setting setting;
     double values[DRAPE_PARAM_WIDEST];
-    DRAPE_TRY(read_param(r, &key->param, value, &setting, values));
+    if (key->or_number && json_is_number(value)) {
+        char text[32];
+        snprintf(text, sizeof text, "%.17g", json_number_value(value));
+        setting = (drape_setting){.name = key->param.name, .text = drape_arena_text(r->arena, text)};
+        if (!setting.text)
+            return DRAPE_E_MEMORY;
+    } else
+        DRAPE_TRY(read_param(r, &key->param, value, &setting, values));
     drape_scene_store(key, &setting, values, def);
     return DRAPE_OK;
 }

@@ -461,10 +461,11 @@ static const drape_scene_key scene_keys[] = {
             "cloth that begins through cloth or colliders is taken apart before the first step"),
      .optional = true, .child = &untangle},
     {DRAPE_TEXT("accuracy",
-                "largest distance to the motion of the model, RMS over the nodes of a cloth: a length, \"1mm\", or a "
+                "largest distance to the motion of the model, RMS over the nodes of a cloth: a length, "
+                "\"1mm\", or a "
                 "share of its diagonal, \"1e-2\"; the method is chosen, and the run repeated until it holds",
                 .derived = "none: one run, by the integrator"),
-     IN(drape_scene_def, accuracy)},
+     IN(drape_scene_def, accuracy), .or_number = true},
     {SHAPED(DRAPE_SCENE_OBJECT, "integrator", UNSAID, "method and its settings"),
      IN(drape_scene_def, integrator), .child = &integrator},
     {SHAPED(DRAPE_SCENE_OBJECT, "controller", UNSAID, "step controller and its settings"),
