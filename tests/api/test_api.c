@@ -11,13 +11,6 @@
 
 /* ---- Helpers ---- */
 
-static drape_context *make_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 static void check_message(const drape_context *ctx, const char *part)
 {
     const char *message = drape_context_message(ctx);
@@ -30,15 +23,13 @@ static void check_message(const drape_context *ctx, const char *part)
 static drape_status compile_text(drape_context *ctx, const char *text, drape_model **model)
 {
     char quoted[4096];
-    drape_scene *scene = NULL;
+    scoped_parsed *scene = NULL;
     snprintf(quoted, sizeof quoted, "%s", text);
-    for (char *c = quoted; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(quoted);
     *model = NULL;
     drape_status status = drape_scene_parse(ctx, quoted, "s.json", &scene);
     if (!status)
         status = drape_scene_compile(scene, model);
-    drape_scene_destroy(&scene);
     return status;
 }
 
@@ -56,23 +47,15 @@ static drape_status compile_text(drape_context *ctx, const char *text, drape_mod
 static drape_model *make_sheet(drape_context *ctx)
 {
     drape_model *model;
-    drape_status status = compile_text(ctx, SHEET, &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, compile_text(ctx, SHEET, &model));
     return model;
 }
 
 static drape_sim *make_sim(drape_context *ctx, const drape_model *model)
 {
     drape_sim *sim = NULL;
-    ck_assert_msg(drape_sim_create(ctx, model, NULL, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_sim_create(ctx, model, NULL, &sim));
     return sim;
-}
-
-static void close_all(drape_context **ctx, drape_model **model, drape_sim **sim)
-{
-    drape_sim_destroy(sim);
-    drape_model_destroy(model);
-    drape_context_destroy(ctx);
 }
 
 /* The scene above as structs. */
@@ -133,16 +116,15 @@ static void fill_scene(host_scene *s)
 
 static uint64_t hash_after(drape_context *ctx, const drape_model *model, double t)
 {
-    drape_sim *sim = make_sim(ctx, model);
-    ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s", drape_context_message(ctx));
+    scoped_sim *sim = make_sim(ctx, model);
+    assert_ok(ctx, drape_sim_advance(sim, t));
     uint64_t hash = drape_sim_hash(sim);
-    drape_sim_destroy(&sim);
     return hash;
 }
 
 /* ---- Defs ---- */
 
-START_TEST(defs_that_were_not_initialised_are_refused)
+TEST(defs_that_were_not_initialised_are_refused)
 {
     drape_context *ctx = make_context(), *other = NULL;
     drape_context_def context_def = {0};
@@ -164,7 +146,6 @@ START_TEST(defs_that_were_not_initialised_are_refused)
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* An array of `count` defs as an older caller has them: only their first `size` bytes, without gaps. The
  * memory after the last one is not readable. */
@@ -181,7 +162,7 @@ static void *as_older(const void *defs, size_t count, size_t full, size_t size)
 
 /* Every def in every shorter version, one for each of its members to end before. Members that an older caller
  * does not have get their defaults. */
-START_TEST(every_older_def_is_read)
+TEST(every_older_def_is_read)
 {
     static const size_t sims[] = {offsetof(drape_sim_def, controller),
                                   offsetof(drape_sim_def, dt),
@@ -200,11 +181,11 @@ START_TEST(every_older_def_is_read)
                                     sizeof(drape_scene_def)},
                         pins[] = {offsetof(drape_pin_def, clamp), sizeof(drape_pin_def)},
                         cloths[] = {sizeof(drape_cloth_def) - sizeof(double[3]), sizeof(drape_cloth_def)};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene s;
     fill_scene(&s);
     memset(s.cloth.velocity, 0, sizeof s.cloth.velocity);
-    drape_model *model = NULL;
+    scoped_model *model = NULL;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_OK);
     uint64_t expected = hash_after(ctx, model, 0.05);
     drape_context *other = NULL;
@@ -214,15 +195,13 @@ START_TEST(every_older_def_is_read)
     ck_assert_int_eq(drape_context_create(&context_def, &other), DRAPE_OK);
     drape_context_destroy(&other);
     for (size_t i = 0; i < sizeof sims / sizeof *sims; i++) {
-        drape_sim_def *def = malloc(sims[i]);
-        drape_sim *sim = NULL;
+        scoped_memory drape_sim_def *def = malloc(sims[i]);
+        scoped_sim *sim = NULL;
         drape_sim_def_init(def, sims[i]);
         ck_assert_msg(drape_sim_create(ctx, model, def, &sim) == DRAPE_OK, "%zu bytes: %s", sims[i],
                       drape_context_message(ctx));
         ck_assert_int_eq(drape_sim_advance(sim, 0.05), DRAPE_OK);
         ck_assert_uint_eq(drape_sim_hash(sim), expected);
-        drape_sim_destroy(&sim);
-        free(def);
     }
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++)
         for (size_t p = 0; p < sizeof pins / sizeof *pins; p++)
@@ -241,15 +220,12 @@ START_TEST(every_older_def_is_read)
                 drape_model_destroy(&same);
                 free(older_scene), free(older_cloth), free(older_pins);
             }
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* A collider of an older caller; defs in arrays that are zeroed, too long, or of two sizes in one array. */
-START_TEST(defs_in_arrays_are_checked)
+TEST(defs_in_arrays_are_checked)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_model *model = NULL;
     drape_collider_def colliders[2];
     const double center[3] = {0, -1, 0};
@@ -264,7 +240,7 @@ START_TEST(defs_in_arrays_are_checked)
     void *older = as_older(colliders, 2, sizeof *colliders, offsetof(drape_collider_def, track));
     s.scene.colliders = older;
     s.scene.collider_count = 2;
-    ck_assert_msg(drape_model_create(ctx, &s.scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_model_create(ctx, &s.scene, &model));
     ck_assert_int_eq(drape_model_collider_count(model), 2);
     drape_model_destroy(&model);
     free(older);
@@ -289,9 +265,7 @@ START_TEST(defs_in_arrays_are_checked)
         check_message(ctx, says);
         ck_assert_ptr_null(model);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void *some_memory(void *user, size_t size)
 {
@@ -299,19 +273,17 @@ static void *some_memory(void *user, size_t size)
     return malloc(size);
 }
 
-START_TEST(half_an_allocator_is_refused)
+TEST(half_an_allocator_is_refused)
 {
     drape_context *ctx = NULL;
-    drape_context_def def;
-    drape_context_def_init(&def, sizeof def);
+    drape_context_def def = context_def();
     def.allocate = some_memory;
     ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_E_ARGUMENT);
     ck_assert_ptr_null(ctx);
 }
-END_TEST
 
 /* Wrong values in a sim's def, and the message for each. */
-START_TEST(sim_defs_are_checked)
+TEST(sim_defs_are_checked)
 {
     static const struct {
         const char *integrator, *controller, *key;
@@ -338,13 +310,12 @@ START_TEST(sim_defs_are_checked)
         {.threads = 0, .says = "threads = 0; it is 1 to 256"},
         {.threads = 257, .says = "threads = 257"},
     };
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         drape_sim *sim = (drape_sim *)(uintptr_t)1;
         const drape_setting setting = {cases[i].key, cases[i].number, cases[i].text};
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        drape_sim_def def = sim_def();
         def.integrator = cases[i].integrator;
         def.controller = cases[i].controller;
         def.integrator_settings = &setting;
@@ -358,10 +329,7 @@ START_TEST(sim_defs_are_checked)
         ck_assert_ptr_null(sim);
         check_message(ctx, cases[i].says);
     }
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Parts of a scene that are NULL where there should be something, or zeroed: assignments to the defs. */
 #define ZEROED(PART)                                                                                         \
@@ -402,7 +370,7 @@ static bool zeroed_is_refused(int which)
     return drape_model_create(ctx, &s.scene, &model) < 0 && !model && *drape_context_message(ctx);
 }
 
-START_TEST(zeroed_parts_of_a_scene_are_refused)
+TEST(zeroed_parts_of_a_scene_are_refused)
 {
     static const char *const parts[] = {ZEROED(NAME)};
     for (int which = 0; which < (int)(sizeof parts / sizeof *parts); which++) {
@@ -415,17 +383,16 @@ START_TEST(zeroed_parts_of_a_scene_are_refused)
         ck_assert_msg(status == 0, "%s: %s", parts[which], WIFEXITED(status) ? "taken" : "crash");
     }
 }
-END_TEST
 
 /* ---- Scenes ---- */
 
-START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
+TEST(a_scene_in_memory_is_the_same_as_in_a_file)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene s;
-    drape_model *text = make_sheet(ctx), *memory = NULL;
+    scoped_model *text = make_sheet(ctx), *memory = NULL;
     fill_scene(&s);
-    ck_assert_msg(drape_model_create(ctx, &s.scene, &memory) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_model_create(ctx, &s.scene, &memory));
     memset(&s, 0xee, sizeof s); /* the model keeps no pointer into the defs */
     ck_assert_int_eq(drape_model_node_count(memory), 36);
     ck_assert_int_eq(drape_model_dof_count(memory), 3 * 34);
@@ -434,16 +401,12 @@ START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
     ck_assert_double_eq(drape_model_duration(memory), 1);
     ck_assert_uint_eq(hash_after(ctx, memory, 0.2), hash_after(ctx, text, 0.2));
     ck_assert_uint_ne(hash_after(ctx, memory, 0.1), hash_after(ctx, text, 0.2));
-    drape_model_destroy(&memory);
-    drape_model_destroy(&text);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* The hash covers time, positions and velocities: a change of any one of them changes it. */
-START_TEST(the_hash_sees_all_of_the_state)
+TEST(the_hash_sees_all_of_the_state)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene s;
     drape_model *models[3];
     uint64_t hashes[3];
@@ -469,14 +432,12 @@ START_TEST(the_hash_sees_all_of_the_state)
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &models[0]), DRAPE_OK);
     ck_assert_uint_ne(hash_after(ctx, models[0], 0.01), hash_after(ctx, models[0], 0.02));
     drape_model_destroy(&models[0]);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_model_can_be_read)
+TEST(a_model_can_be_read)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
     int32_t nodes = drape_model_node_count(model), triangles = drape_model_triangle_count(model);
     double mass = 0;
     ck_assert_int_eq(nodes, 36);
@@ -495,45 +456,36 @@ START_TEST(a_model_can_be_read)
         ck_assert_int_eq(drape_model_pinned(model)[i], i == 0 || i == 5);
     }
     ck_assert_double_eq_tol(mass, 50 * sqrt(3) / 4 * 0.01 * 0.2, 1e-15); /* triangles of 0.1 m, 0.2 kg/m2 */
-    drape_sim *sim = make_sim(ctx, model);
+    scoped_sim *sim = make_sim(ctx, model);
     ck_assert_ptr_eq(drape_sim_model(sim), model);
     ck_assert_mem_eq(drape_sim_positions(sim), drape_model_rest_positions(model), 3 * 36 * sizeof(double));
     for (int32_t i = 0; i < 3 * nodes; i++)
         ck_assert_double_eq(drape_sim_velocities(sim)[i],
                             i % 3 == 2 && !drape_model_pinned(model)[i / 3] ? 0.25 : 0);
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
-START_TEST(an_override_is_a_value_of_the_scene)
+TEST(an_override_is_a_value_of_the_scene)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     char text[] = SHEET;
     drape_scene *scene = NULL;
-    drape_model *model = make_sheet(ctx), *other = NULL;
-    drape_sim *sim = NULL;
-    drape_sim_def def;
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    scoped_model *model = make_sheet(ctx), *other = NULL;
+    scoped_sim *sim = NULL;
+    drape_sim_def def = sim_def();
+    quote(text);
     ck_assert_int_eq(drape_scene_parse(ctx, text, "s.json", &scene), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/integrator/dt", "0.02"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/integrator/linear_solver", "dense"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_compile(scene, &other), DRAPE_OK);
     drape_scene_destroy(&scene);
     const drape_setting dense = {"linear_solver", 0, "dense"};
-    drape_sim_def_init(&def, sizeof def);
     def.dt = 0.02;
     def.integrator_settings = &dense;
     def.integrator_setting_count = 1;
     ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
     ck_assert_uint_eq(drape_sim_hash(sim), hash_after(ctx, other, 0.2));
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_model_destroy(&other);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Terms of the host ---- */
 
@@ -594,23 +546,20 @@ static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
 
 /* Four nodes of 0.1 kg, each on a spring of 10 N/m and not connected: w = 10 rad/s, y = 1 - cos(10 t), except
  * for the decay of backward Euler, exp(-w^2 h t/2), and its phase error of the same order. */
-START_TEST(a_user_defined_term_works)
+TEST(a_user_defined_term_works)
 {
-    drape_context *ctx = make_context();
-    drape_model *model;
+    scoped_context *ctx = make_context();
+    scoped_model *model = NULL;
     ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_OK);
-    drape_status status = compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
-    drape_sim *sim = make_sim(ctx, model);
+    assert_ok(ctx, compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model));
+    scoped_sim *sim = make_sim(ctx, model);
     ck_assert_double_gt(drape_sim_energy(sim).elastic, 4 * 0.5 * 10 * 1);
     ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
     for (int i = 0; i < 4; i++)
         ck_assert_double_eq_tol(drape_sim_positions(sim)[3 * i + 1], 1 - cos(2.0), 100 * 0.001 * 0.2);
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
-START_TEST(faults_of_a_user_defined_term_are_reported_at_its_place)
+TEST(faults_of_a_user_defined_term_are_reported_at_its_place)
 {
     static const struct {
         const char *scene, *says;
@@ -625,7 +574,7 @@ START_TEST(faults_of_a_user_defined_term_are_reported_at_its_place)
         {ATTRACTED("{'type': 'host.attract', 'stiffness': 1}, {'type': 'host.attract', 'stiffness': 2}"),
          "/cloth/0/terms/1: the term \"host.attract\" is named twice"},
     };
-    drape_context *ctx = make_context(), *other = make_context();
+    scoped_context *ctx = make_context(), *other = make_context();
     drape_model *model;
     ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_OK);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -638,10 +587,7 @@ START_TEST(faults_of_a_user_defined_term_are_reported_at_its_place)
     ck_assert_int_eq(compile_text(other, ATTRACTED("{'type': 'host.attract', 'stiffness': 1}"), &model),
                      DRAPE_E_ARGUMENT);
     check_message(other, "there is no term \"host.attract\"");
-    drape_context_destroy(&other);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static const int32_t a_node[] = {0};
 
@@ -693,7 +639,7 @@ static drape_status says_nothing(const drape_cloth_view *cloth, const double *pa
     return DRAPE_E_FILE;
 }
 
-START_TEST(elements_of_a_user_defined_term_are_checked)
+TEST(elements_of_a_user_defined_term_are_checked)
 {
     static const struct {
         drape_status (*build)(const drape_cloth_view *, const double *, drape_term_builder *);
@@ -709,7 +655,7 @@ START_TEST(elements_of_a_user_defined_term_are_checked)
         {says_nothing, DRAPE_E_FILE, "/cloth/0/terms/0: build() of \"host.attract\" returned e_file"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        drape_context *ctx = make_context();
+        scoped_context *ctx = make_context();
         drape_model *model;
         drape_term_ops ops = attract;
         ops.build = cases[i].build;
@@ -717,10 +663,8 @@ START_TEST(elements_of_a_user_defined_term_are_checked)
         ck_assert_int_eq(compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 1}"), &model),
                          cases[i].status);
         check_message(ctx, cases[i].says);
-        drape_context_destroy(&ctx);
     }
 }
-END_TEST
 
 /* ---- Colliders, built in and user-defined ---- */
 
@@ -766,17 +710,16 @@ static const drape_collider_ops blob = {.struct_size = sizeof(drape_collider_ops
                                         .shape = blob_shape,
                                         .distance = blob_distance};
 
-START_TEST(colliders_of_a_scene_can_be_asked)
+TEST(colliders_of_a_scene_can_be_asked)
 {
-    drape_context *ctx = make_context();
-    drape_model *model;
-    drape_status status =
-        compile_text(ctx,
-                     WITH_COLLIDERS("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]},"
-                                    "{'type': 'sphere', 'center': [0, 0, 0], 'radius': 1, 'name': 'ball',"
-                                    " 'track': [[1, [0, 0, 0]], [2, [0, 0, 4]]]}"),
-                     &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    scoped_context *ctx = make_context();
+    scoped_model *model = NULL;
+    assert_ok(ctx, compile_text(
+                       ctx,
+                       WITH_COLLIDERS("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]},"
+                                      "{'type': 'sphere', 'center': [0, 0, 0], 'radius': 1, 'name': 'ball',"
+                                      " 'track': [[1, [0, 0, 0]], [2, [0, 0, 4]]]}"),
+                       &model));
     ck_assert_int_eq(drape_model_collider_count(model), 2);
     drape_collider_motion plane = drape_model_collider(model, 0, 1.5),
                           ball = drape_model_collider(model, 1, 1.5);
@@ -791,15 +734,12 @@ START_TEST(colliders_of_a_scene_can_be_asked)
     ck_assert_str_eq(drape_model_collider(model, -1, 0).type, "");
     ck_assert_str_eq(drape_model_collider(NULL, 0, 0).name, "");
     ck_assert_int_eq(drape_model_collider_count(NULL), 0);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
+TEST(a_collider_in_memory_is_the_same_as_in_a_file)
 {
     host_scene s;
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_model *model = NULL;
     const double center[3] = {0.1, 0.2, 0.3}, turn[4] = {0, 1, 0, 45};
     const drape_setting box[] = {{.name = "center", .vector = center, .vector_count = 3},
@@ -807,9 +747,8 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
                                  {.name = "rotate", .vector = turn, .vector_count = 4}};
     const drape_track_key keys[] = {{0, {0, 0, 0}}, {1, {1, 0, 0}}};
     const drape_setting thickness = {"thickness", 0.01, NULL}, lagged = {"friction", 0, "lagged"};
-    drape_collider_def def;
+    drape_collider_def def = collider_def();
     fill_scene(&s);
-    drape_collider_def_init(&def, sizeof def);
     def.entry = (drape_entry_def){"box", box, 3};
     def.track = keys;
     def.key_count = 2;
@@ -819,7 +758,7 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
     s.scene.self_contact_count = 1;
     s.scene.contact = &lagged;
     s.scene.contact_count = 1;
-    ck_assert_msg(drape_model_create(ctx, &s.scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_model_create(ctx, &s.scene, &model));
     ck_assert_double_eq(drape_model_collider(model, 0, 0.5).displacement[0], 0.5);
     drape_model_destroy(&model);
 
@@ -833,15 +772,13 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
     check_message(
         ctx, "/colliders: an array of 4097 is not allowed; colliders is an array of objects, at most 4096");
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* -1 stands for a number that is not given; nothing else below the range does. */
-START_TEST(numbers_below_not_given_are_refused)
+TEST(numbers_below_not_given_are_refused)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = NULL;
+    scoped_context *ctx = make_context();
+    scoped_model *model = NULL;
     host_scene s;
     fill_scene(&s);
     s.pins[0].triangle = -7;
@@ -853,12 +790,9 @@ START_TEST(numbers_below_not_given_are_refused)
     check_message(ctx, "/cloth/0/pins/1/row: -2147483648 is not allowed; row is an integer in [0, ");
     s.pins[1].row = -1;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_OK);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_user_defined_collider_works)
+TEST(a_user_defined_collider_works)
 {
     static const struct {
         const char *scene, *says;
@@ -872,27 +806,24 @@ START_TEST(a_user_defined_collider_works)
          "/colliders/0/middle: 2 is not allowed; middle is [x, y, z], each in [-1, 1] m"},
         {WITH_COLLIDERS("{'type': 'host.blb', 'size': 2}"), "did you mean \"host.blob\"?"},
     };
-    drape_context *ctx = make_context();
-    drape_model *model;
+    scoped_context *ctx = make_context();
+    scoped_model *model = NULL;
     ck_assert_int_eq(drape_context_add_collider(ctx, &blob), DRAPE_OK);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ck_assert_int_eq(compile_text(ctx, cases[i].scene, &model), DRAPE_E_ARGUMENT);
         check_message(ctx, cases[i].says);
     }
-    drape_status status = compile_text(
-        ctx, WITH_COLLIDERS("{'type': 'host.blob', 'size': 0.5, 'tilt': [0, 3, 0, 30]}"), &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx,
+              compile_text(ctx, WITH_COLLIDERS("{'type': 'host.blob', 'size': 0.5, 'tilt': [0, 3, 0, 30]}"),
+                           &model));
     ck_assert_str_eq(drape_model_collider(model, 0, 0).type, "host.blob");
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* The shorter ops of an older caller, freed after they were registered: the library has copied them. */
-START_TEST(ops_are_copied_and_may_be_older)
+TEST(ops_are_copied_and_may_be_older)
 {
-    drape_context *ctx = make_context(), *other = make_context();
-    drape_model *model, *same;
+    scoped_context *ctx = make_context(), *other = make_context();
+    scoped_model *model = NULL, *same = NULL;
     void *term = as_older(&attract, 1, sizeof attract, offsetof(drape_term_ops, in_medium)),
          *shape = as_older(&blob, 1, sizeof blob, offsetof(drape_collider_ops, smooth));
     ck_assert_int_eq(drape_context_add_term(ctx, term), DRAPE_OK);
@@ -905,12 +836,7 @@ START_TEST(ops_are_copied_and_may_be_older)
     ck_assert_int_eq(compile_text(other, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &same),
                      DRAPE_OK);
     ck_assert_uint_eq(hash_after(ctx, model, 0.2), hash_after(other, same, 0.2));
-    drape_model_destroy(&same);
-    drape_model_destroy(&model);
-    drape_context_destroy(&other);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void some_law(const double *params, int32_t count, const double *k, const double *strain,
                      const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
@@ -986,9 +912,9 @@ static void fill_wide(void)
         wide[i] = (drape_param)DRAPE_VECTOR("wide", "m", 0, 0, 1, "three");
 }
 
-START_TEST(malformed_terms_are_refused)
+TEST(malformed_terms_are_refused)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_term_ops ops;
     drape_param one;
     char names[33][16];
@@ -1002,13 +928,11 @@ START_TEST(malformed_terms_are_refused)
         ck_assert_int_eq(drape_context_add_term(ctx, &ops), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(malformed_colliders_are_refused)
+TEST(malformed_colliders_are_refused)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_collider_ops ops;
     drape_param one;
     char names[33][16];
@@ -1022,9 +946,7 @@ START_TEST(malformed_colliders_are_refused)
         ck_assert_int_eq(drape_context_add_collider(ctx, &ops), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Observers, statistics ---- */
 
@@ -1072,23 +994,21 @@ static double hermite(const record *r, int64_t k, double t)
 
 static record run_frames(double rate, double t_end)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = NULL;
-    drape_sim_def def;
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *sim = NULL;
+    drape_sim_def def = sim_def();
     record r = {0};
-    drape_sim_def_init(&def, sizeof def);
     def.frame_rate = rate;
     ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
     ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
     r.y[0] = drape_sim_positions(sim)[3 * 35 + 1];
     r.v[0] = drape_sim_velocities(sim)[3 * 35 + 1];
     ck_assert_int_eq(drape_sim_advance(sim, t_end), DRAPE_OK);
-    close_all(&ctx, &model, &sim);
     return r;
 }
 
-START_TEST(frames_come_in_time)
+TEST(frames_come_in_time)
 {
     static const double rates[] = {30, 60, 100, 250, 7};
     for (int i = 0; i < 5; i++) {
@@ -1104,14 +1024,13 @@ START_TEST(frames_come_in_time)
         }
     }
 }
-END_TEST
 
 /* Frames and final state are the same if an advance is split at the ends of steps. */
-START_TEST(advances_may_be_cut_up)
+TEST(advances_may_be_cut_up)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = make_sim(ctx, model);
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *sim = make_sim(ctx, model);
     record r = {0}, whole = run_frames(0, 0.4);
     ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
     for (int k = 1; k <= 40; k++) {
@@ -1121,9 +1040,7 @@ START_TEST(advances_may_be_cut_up)
     ck_assert_int_eq(r.frames, whole.frames);
     ck_assert_mem_eq(r.height, whole.height, (size_t)r.frames * sizeof *r.height);
     ck_assert_uint_eq(drape_sim_hash(sim), hash_after(ctx, model, 0.4));
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 /* ---- States set by the host ---- */
 
@@ -1151,12 +1068,11 @@ static drape_sim *make_sim_of(drape_context *ctx, const drape_model *model, cons
                               const char *controller)
 {
     drape_sim *sim = NULL;
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = integrator;
     def.controller = controller;
     def.dt = 1.0 / 64;
-    ck_assert_msg(drape_sim_create(ctx, model, &def, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_sim_create(ctx, model, &def, &sim));
     return sim;
 }
 
@@ -1179,12 +1095,12 @@ static void end_alike(drape_sim *sim, drape_sim *alone, double t)
 
 /* With all nodes in one point there are no angles; the next state that has angles does not depend on the
  * past. */
-START_TEST(a_collapsed_state_leaves_nothing_behind)
+TEST(a_collapsed_state_leaves_nothing_behind)
 {
     const double zero[3 * MAX_NODES] = {0};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene h;
-    drape_model *model;
+    scoped_model *model = NULL;
     fill_scene(&h);
     h.cloth.pin_count = 0;
     ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
@@ -1195,21 +1111,18 @@ START_TEST(a_collapsed_state_leaves_nothing_behind)
     ck_assert_int_eq(set_state(alone, &s), DRAPE_OK);
     ck_assert_double_eq(drape_sim_energy(sim).elastic, drape_sim_energy(alone).elastic);
     end_alike(sim, alone, 0.1);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_state_of_the_host_is_where_a_run_starts)
+TEST(a_state_of_the_host_is_where_a_run_starts)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene h;
-    drape_model *model;
+    scoped_model *model = NULL;
     fill_scene(&h);
     h.cloth.pin_count = 0;
     h.cloth.term_count = 0;
     ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
-    drape_sim *sim = make_sim_of(ctx, model, "be", "fixed");
+    scoped_sim *sim = make_sim_of(ctx, model, "be", "fixed");
     ck_assert_int_eq(drape_sim_advance(sim, 0.25), DRAPE_OK);
     state s = state_of(sim);
     s.t = 2;
@@ -1228,45 +1141,35 @@ START_TEST(a_state_of_the_host_is_where_a_run_starts)
         ck_assert_double_eq_tol(drape_sim_velocities(sim)[i], s.v[i] + g, 1e-10);
         ck_assert_double_eq_tol(drape_sim_positions(sim)[i], s.x[i] + s.v[i] + g * 65 / 128, 1e-10);
     }
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 /* The past of a sim leaves no trace: from a state that is set, it advances with the same bits as a new sim,
  * forwards and backwards in time, under every integrator and controller. */
-START_TEST(the_past_does_not_count_after_a_state_was_set)
+TEST(the_past_does_not_count_after_a_state_was_set)
 {
     static const char *const integrators[][2] = {
         {"be", "halving"},     {"bdf2", "halving"}, {"midpoint", "strain"}, {"ida", "halving"},
         {"be", "error"},       {"bdf2", "error"},   {"midpoint", "error"},  {"ida", "fixed"},
         {"trbdf2", "halving"}, {"trbdf2", "error"}};
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *source = make_sim_of(ctx, model, "be", "halving");
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *source = make_sim_of(ctx, model, "be", "halving");
     ck_assert_int_eq(drape_sim_advance(source, 0.125), DRAPE_OK);
     const state s = state_of(source);
     for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
-        drape_sim *used = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]),
-                  *fresh = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]);
-        ck_assert_msg(drape_sim_advance(used, 0.3) == DRAPE_OK, "%s", drape_context_message(ctx));
+        scoped_sim *used = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]),
+                   *fresh = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]);
+        assert_ok(ctx, drape_sim_advance(used, 0.3));
         ck_assert_int_eq(set_state(used, &s), DRAPE_OK);
         ck_assert_int_eq(set_state(fresh, &s), DRAPE_OK);
         for (int k = 1; k <= 4; k++) {
-            ck_assert_msg(drape_sim_advance(used, 0.125 + 0.05 * k) == DRAPE_OK, "%s",
-                          drape_context_message(ctx));
-            ck_assert_msg(drape_sim_advance(fresh, 0.125 + 0.05 * k) == DRAPE_OK, "%s",
-                          drape_context_message(ctx));
+            assert_ok(ctx, drape_sim_advance(used, 0.125 + 0.05 * k));
+            assert_ok(ctx, drape_sim_advance(fresh, 0.125 + 0.05 * k));
             ck_assert_msg(drape_sim_hash(used) == drape_sim_hash(fresh), "%s, %s, %g s later",
                           integrators[i][0], integrators[i][1], 0.05 * k);
         }
-        drape_sim_destroy(&used);
-        drape_sim_destroy(&fresh);
     }
-    drape_sim_destroy(&source);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void refuse_state(drape_context *ctx, drape_sim *sim, const state *s, const char *part)
 {
@@ -1276,11 +1179,11 @@ static void refuse_state(drape_context *ctx, drape_sim *sim, const state *s, con
     ck_assert_uint_eq(drape_sim_hash(sim), hash);
 }
 
-START_TEST(states_of_the_host_are_checked)
+TEST(states_of_the_host_are_checked)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = make_sim(ctx, model);
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *sim = make_sim(ctx, model);
     ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
     const state good = state_of(sim);
     const uint64_t hash = drape_sim_hash(sim);
@@ -1312,9 +1215,7 @@ START_TEST(states_of_the_host_are_checked)
     bad.v[0] = 3;
     ck_assert_int_eq(set_state(sim, &bad), DRAPE_OK);
     ck_assert_uint_eq(drape_sim_hash(sim), hash);
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 typedef struct frame_times {
     int64_t frames, number; /* of the first */
@@ -1333,7 +1234,7 @@ static drape_status note_frame_time(void *user, const drape_event *event)
 
 /* Frames of 1/30 s: the first is at or after the new time; no frame comes twice if the time does not
  * change. */
-START_TEST(frames_follow_the_time_of_a_state)
+TEST(frames_follow_the_time_of_a_state)
 {
     static const struct {
         double t, end;
@@ -1344,14 +1245,14 @@ START_TEST(frames_follow_the_time_of_a_state)
                  {0.1, 0.15, 2, 0.1},       /* back in time: frames 3, 4 */
                  {0.15, 0.19, 1, 5 / 30.0}, /* the present time */
                  {0, 0.01, 1, 0}};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     host_scene h;
-    drape_model *model;
+    scoped_model *model = NULL;
     frame_times r = {0};
     fill_scene(&h);
     h.cloth.pin_count = 0;
     ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
-    drape_sim *sim = make_sim(ctx, model);
+    scoped_sim *sim = make_sim(ctx, model);
     ck_assert_int_eq(drape_sim_observe(sim, note_frame_time, &r), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
     for (size_t i = 0; i < sizeof jumps / sizeof *jumps; i++) {
@@ -1364,9 +1265,7 @@ START_TEST(frames_follow_the_time_of_a_state)
         ck_assert_double_eq_tol(r.first, jumps[i].first, 1e-15);
         ck_assert_int_eq(r.number, llround(30 * r.first));
     }
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 /* ---- Reasons and explanations ---- */
 
@@ -1384,20 +1283,18 @@ static drape_status fussy_check(const drape_elements *el, const double *x, const
     return DRAPE_RETRY_DEGENERATE;
 }
 
-START_TEST(more_reasons_than_there_is_room_for_are_other)
+TEST(more_reasons_than_there_is_room_for_are_other)
 {
-    drape_context *ctx = make_context();
-    drape_model *model;
-    drape_sim *sim = NULL;
-    drape_sim_def def;
+    scoped_context *ctx = make_context();
+    scoped_model *model = NULL;
+    scoped_sim *sim = NULL;
+    drape_sim_def def = sim_def();
     drape_term_ops fussy = attract;
     int64_t count = 0, sum = 0;
     fussy.check = fussy_check;
     faults_found = 0;
     ck_assert_int_eq(drape_context_add_term(ctx, &fussy), DRAPE_OK);
-    drape_status status = compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
-    drape_sim_def_init(&def, sizeof def);
+    assert_ok(ctx, compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model));
     def.dt = 0.001;
     def.dt_min = ldexp(0.001, -40) * 0.99; /* 41 attempts */
     ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
@@ -1411,21 +1308,18 @@ START_TEST(more_reasons_than_there_is_room_for_are_other)
     }
     ck_assert_ptr_null(drape_sim_reason(sim, 32, &count));
     ck_assert_int_eq(sum, drape_sim_statistics(sim).steps_rejected);
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 /* One Newton iteration is not enough. The message names the node with the largest residual and, if the sheet
  * is distorted, the most distorted element: an edge of 3 m that was 0.1 m long, a triangle at 2 % of its
  * altitude. */
-START_TEST(a_failure_names_what_is_distorted)
+TEST(a_failure_names_what_is_distorted)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = NULL;
-    drape_sim_def def;
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *sim = NULL;
+    drape_sim_def def = sim_def();
     const drape_setting one = {"max_iterations", 1, NULL};
-    drape_sim_def_init(&def, sizeof def);
     def.integrator_settings = &one;
     def.integrator_setting_count = 1;
     def.controller = "fixed";
@@ -1449,15 +1343,13 @@ START_TEST(a_failure_names_what_is_distorted)
     ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_E_SOLVER);
     check_message(ctx, "; most distorted: triangle (nodes ");
     check_message(ctx, " of sheet): altitude / rest altitude = 0.02");
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
-START_TEST(a_sim_has_at_most_8_observers)
+TEST(a_sim_has_at_most_8_observers)
 {
-    drape_context *ctx = make_context();
-    drape_model *model = make_sheet(ctx);
-    drape_sim *sim = make_sim(ctx, model);
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_sheet(ctx);
+    scoped_sim *sim = make_sim(ctx, model);
     record r[9] = {{0}};
     for (int i = 0; i < 9; i++)
         ck_assert_int_eq(drape_sim_observe(sim, observe, &r[i]), i < 8 ? DRAPE_OK : DRAPE_E_ARGUMENT);
@@ -1466,9 +1358,7 @@ START_TEST(a_sim_has_at_most_8_observers)
     ck_assert_int_eq(drape_sim_advance(sim, 0.05), DRAPE_OK);
     for (int i = 0; i < 9; i++)
         ck_assert_int_eq(r[i].attempts, i < 8 ? 5 : 0);
-    close_all(&ctx, &model, &sim);
 }
-END_TEST
 
 /* ---- Threads, names ---- */
 
@@ -1477,7 +1367,7 @@ typedef struct job {
     uint64_t hash;
 } job;
 
-START_TEST(statuses_have_names)
+TEST(statuses_have_names)
 {
     static const struct {
         drape_status status;
@@ -1505,11 +1395,10 @@ START_TEST(statuses_have_names)
              DRAPE_VERSION_PATCH);
     ck_assert_str_eq(drape_version(), version);
 }
-END_TEST
 
-START_TEST(messages_are_one_line)
+TEST(messages_are_one_line)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_model *model = NULL;
     ck_assert_str_eq(drape_context_message(ctx), "");
     drape_context_set_message(ctx, "a\nb\tc\x7f %d", 5);
@@ -1520,20 +1409,4 @@ START_TEST(messages_are_one_line)
     check_message(ctx, "unknown key");
     ck_assert_int_lt(compile_text(ctx, "{'drape': 1,\n 'cloth': [{]}", &model), 0);
     check_message(ctx, "s.json:2:");
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("api", defs_that_were_not_initialised_are_refused, every_older_def_is_read, defs_in_arrays_are_checked,
-      half_an_allocator_is_refused, sim_defs_are_checked, zeroed_parts_of_a_scene_are_refused,
-      a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
-      an_override_is_a_value_of_the_scene, a_user_defined_term_works, ops_are_copied_and_may_be_older,
-      faults_of_a_user_defined_term_are_reported_at_its_place, elements_of_a_user_defined_term_are_checked,
-      malformed_terms_are_refused, colliders_of_a_scene_can_be_asked,
-      a_collider_in_memory_is_the_same_as_in_a_file, numbers_below_not_given_are_refused,
-      a_user_defined_collider_works, malformed_colliders_are_refused, frames_come_in_time,
-      advances_may_be_cut_up, a_collapsed_state_leaves_nothing_behind,
-      a_state_of_the_host_is_where_a_run_starts, the_past_does_not_count_after_a_state_was_set,
-      states_of_the_host_are_checked, frames_follow_the_time_of_a_state,
-      more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,
-      a_sim_has_at_most_8_observers, statuses_have_names, messages_are_one_line)

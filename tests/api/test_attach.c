@@ -13,12 +13,12 @@
     "'colliders': [{'name': 'body', 'type': 'box', 'center': [0.25, 0.3, 0], 'size': [0.2, 0.2, 0.2], "      \
     "'enabled': false}, {'name': 'other', 'type': 'sphere', 'center': [0, -3, 0], 'radius': 0.1}], "
 
-static host open_sheet(failing_allocator *memory, const char *method, const char *pins)
+static host open_sheet(const char *method, const char *pins)
 {
     char integrator[200];
     snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': %.17g", method,
              strcmp(method, "verlet") == 0 ? FRAME / 64 : FRAME / 2);
-    return open_scene(memory, SHEET, "", pins, integrator, BODIES);
+    return open_scene(SHEET, "", pins, integrator, BODIES);
 }
 
 static const double *at(const host *h, int32_t node)
@@ -57,11 +57,10 @@ static void expect_on_body(const host *h, const int32_t *nodes, int count, const
 
 /* A free node and a pinned one: both are where they were, go with the body, and one is let go with the
  * velocity that it has there: that of the step's mean, on a path of constant speed without turning. */
-START_TEST(nodes_are_attached_and_detached)
+TEST(nodes_are_attached_and_detached)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        host h = open_sheet(&memory, methods[i], "{'edge': 'top'}");
+        scoped_host h = open_sheet(methods[i], "{'edge': 'top'}");
         const int32_t nodes[2] = {12, 0};
         double from[6], all[60], v[3];
         good(&h, drape_sim_advance(h.sim, 8 * FRAME));
@@ -92,10 +91,8 @@ START_TEST(nodes_are_attached_and_detached)
         good(&h, drape_sim_advance(h.sim, 24 * FRAME));
         expect_on_body(&h, nodes + 1, 1, from + 3, 0.04, 0.01, 20);
         ck_assert_double_gt(distance(at(&h, 12), all + 36), 1e-3);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 static double velocity_error(const double *v, const double *x, double turning)
 {
@@ -121,18 +118,17 @@ static drape_status watch(void *user, const drape_event *event)
 /* Pins of a body that moves and turns from the start have its velocity there, and in the frame in the middle
  * of the first step that of the method: the mean over the step of a point that goes round at w r is off by at
  * most w^2 r h / 2 at its end, r < 0.3 m. */
-START_TEST(pins_of_a_moving_body_begin_with_its_velocity)
+TEST(pins_of_a_moving_body_begin_with_its_velocity)
 {
     const double w = 120 * acos(-1.0) / 180, step = 1.0 / 32;
     for (int i = 0; i < METHODS; i++) {
         const char *method = methods[i];
-        failing_allocator memory = {0};
         char integrator[100];
         seen s = {.turning = w};
         snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': %.17g", method,
                  strcmp(method, "verlet") == 0 ? step / 64 : step);
-        host h = open_scene(
-            &memory, SHEET, "", "{'edge': 'top', 'attach': 'mover'}", integrator,
+        scoped_host h = open_scene(
+            SHEET, "", "{'edge': 'top', 'attach': 'mover'}", integrator,
             "'colliders': [{'name': 'mover', 'type': 'sphere', 'center': [0.25, 0.3, 0], 'radius': 0.01, "
             "'enabled': false, 'track': [[0, [0, 0, 0]], [1, [0.4, 0.2, 0]]], "
             "'turns': [{'time': 0, 'rotate': [0, 1, 0, 0]}, {'time': 1, 'rotate': [0, 1, 0, 120]}]}],");
@@ -142,16 +138,13 @@ START_TEST(pins_of_a_moving_body_begin_with_its_velocity)
         good(&h, drape_sim_advance(h.sim, step));
         ck_assert_double_le(s.error[0], 1e-14);
         ck_assert_msg(s.error[1] <= w * w * 0.3 * step / 2, "%s: %g", method, s.error[1]);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* A pin of the scene that a host sends leaves the body; attached again, it rides from where it is. */
-START_TEST(a_pin_that_is_sent_leaves_its_body)
+TEST(a_pin_that_is_sent_leaves_its_body)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be", "{'edge': 'top', 'attach': 'body'}");
+    scoped_host h = open_sheet("be", "{'edge': 'top', 'attach': 'body'}");
     const int32_t node = 0;
     const double to[3] = {0, 0.05, 0};
     double from[3];
@@ -163,55 +156,45 @@ START_TEST(a_pin_that_is_sent_leaves_its_body)
     ck_assert_double_le(distance(at(&h, 0), to), 0);
     ck_assert_double_eq_tol(at(&h, 1)[1], 0.1, 1e-15);
     good(&h, drape_sim_attach(h.sim, 0, 1, &node, NULL)); /* contact has its memory from here on */
-    const long calls = memory.calls;
+    const long calls = h.memory->calls;
     good(&h, drape_sim_attach(h.sim, 0, 1, &node, NULL));
-    ck_assert_int_eq(memory.calls, calls);
+    ck_assert_int_eq(h.memory->calls, calls);
     memcpy(from, to, sizeof from);
     from[1] -= 0.1; /* where it is on the body */
     send(&h, 4 * FRAME, 0.02, 0.1, -20);
     good(&h, drape_sim_advance(h.sim, 12 * FRAME));
     expect_on_body(&h, &node, 1, from, 0.02, 0.1, -20);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A host restores a run that it has attached nodes in, in the middle of the body's path, to the same bits. */
-START_TEST(checkpoints_keep_what_is_attached)
+TEST(checkpoints_keep_what_is_attached)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0}, other = {0};
-        host h = open_sheet(&memory, methods[i],
-                            "{'corner': 'top-left'}, {'corner': 'top-right', 'attach': "
-                            "'other'}"),
-             again = open_sheet(&other, methods[i],
-                                "{'corner': 'top-left'}, {'corner': 'top-right', "
-                                "'attach': 'other'}");
+        scoped_host h = open_sheet(methods[i], "{'corner': 'top-left'}, {'corner': 'top-right', 'attach': "
+                                               "'other'}"),
+                    again = open_sheet(methods[i], "{'corner': 'top-left'}, {'corner': 'top-right', "
+                                                   "'attach': 'other'}");
         const int32_t nodes[2] = {12, 0};
         good(&h, drape_sim_advance(h.sim, 4 * FRAME));
         good(&h, drape_sim_attach(h.sim, 0, 2, nodes, NULL));
         send(&h, 8 * FRAME, 0.02, 0.01, 20);
         good(&h, drape_sim_advance(h.sim, 7 * FRAME));
-        bytes b = bytes_save(h.sim);
+        scoped_bytes b = bytes_save(h.sim);
         good(&again, drape_sim_restore_from(again.sim, b.data, b.size));
         ck_assert_int_eq(drape_sim_attached(again.sim, 12), 0);
         ck_assert_int_eq(drape_sim_attached(again.sim, 4), 1);
         good(&h, drape_sim_advance(h.sim, 16 * FRAME));
         good(&again, drape_sim_advance(again.sim, 16 * FRAME));
         ck_assert_msg(drape_sim_hash(h.sim) == drape_sim_hash(again.sim), "%s", methods[i]);
-        free(b.data);
-        close_scene(&h, &memory);
-        close_scene(&again, &other);
     }
 }
-END_TEST
 
 /* ---- Placed ---- */
 
 static void place(host *h, bool cloth, bool body)
 {
     static const int32_t zero = 0;
-    drape_place_def def;
-    drape_place_def_init(&def, sizeof def);
+    drape_place_def def = place_def();
     def.rotate[1] = 1, def.rotate[3] = 90;
     def.translate[0] = 1;
     def.cloths = def.colliders = &zero;
@@ -222,12 +205,11 @@ static void place(host *h, bool cloth, bool body)
 
 /* With its body, without it, and the body without the cloth: nothing is strained, and the pins ride on from
  * where they are. The body turns by 30 degrees about its pivot, and they with it. */
-START_TEST(placed_cloth_rides_on)
+TEST(placed_cloth_rides_on)
 {
     for (int kind = 1; kind < 4; kind++) {
         const bool cloth = kind & 1, body = kind & 2;
-        failing_allocator memory = {0};
-        host h = open_sheet(&memory, "be", "{'edge': 'top', 'attach': 'body'}");
+        scoped_host h = open_sheet("be", "{'edge': 'top', 'attach': 'body'}");
         double before[60], now[60], pivot[3], c = cos(acos(-1.0) / 6), s = sin(acos(-1.0) / 6), q[4];
         send(&h, 4 * FRAME, 0.02, 0.01, 10);
         good(&h, drape_sim_advance(h.sim, 8 * FRAME));
@@ -249,10 +231,8 @@ START_TEST(placed_cloth_rides_on)
                          to[3] = {pivot[0] + c * x + s * z, now[3 * i + 1], pivot[2] + c * z - s * x};
             ck_assert_double_le(distance(at(&h, i), to), 1e-14);
         }
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 static double strain_of(const host *h)
 {
@@ -267,19 +247,17 @@ static double strain_of(const host *h)
 /* Sent metres away in one frame, a body takes the cloth that hangs from it along. So does each of two
  * bodies that carry one cloth together, one after the other: by the best fit, whose rotation is within
  * 1e-6 of it. */
-START_TEST(a_body_that_is_sent_far_takes_its_cloth_along)
+TEST(a_body_that_is_sent_far_takes_its_cloth_along)
 {
     for (int bodies = 1; bodies <= 2; bodies++) {
-        failing_allocator memory = {0};
-        host h = open_sheet(&memory, "be",
-                            bodies == 1 ? "{'edge': 'top', 'attach': 'body'}"
-                                        : "{'corner': 'top-left', 'attach': 'body'}, {'corner': 'top-right', "
-                                          "'attach': 'other'}");
+        scoped_host h = open_sheet(
+            "be", bodies == 1 ? "{'edge': 'top', 'attach': 'body'}"
+                              : "{'corner': 'top-left', 'attach': 'body'}, {'corner': 'top-right', "
+                                "'attach': 'other'}");
         const double far[3] = {3, 1, 2};
         double before[60];
-        drape_sim_def def;
+        drape_sim_def def = sim_def();
         drape_sim_destroy(&h.sim);
-        drape_sim_def_init(&def, sizeof def);
         def.teleport_speed = 20;
         good(&h, drape_sim_create(h.ctx, h.model, &def, &h.sim));
         good(&h, drape_sim_advance(h.sim, 16 * FRAME));
@@ -292,19 +270,16 @@ START_TEST(a_body_that_is_sent_far_takes_its_cloth_along)
         good(&h, drape_sim_advance(h.sim, 18 * FRAME));
         printf("# strain %.4f, then %.4f\n", strain, strain_of(&h));
         ck_assert_double_le(strain_of(&h), strain + 0.02);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* ---- Changed ---- */
 
 /* A scene that no longer attaches a pin leaves it where it is; one that begins to takes it from there. */
-START_TEST(changed_pins_ride_from_where_they_are)
+TEST(changed_pins_ride_from_where_they_are)
 {
-    failing_allocator memory = {0}, other = {0};
-    host h = open_sheet(&memory, "be", "{'edge': 'top', 'attach': 'body'}");
-    host fixed = open_sheet(&other, "be", "{'edge': 'top'}");
+    scoped_host h = open_sheet("be", "{'edge': 'top', 'attach': 'body'}");
+    scoped_host fixed = open_sheet("be", "{'edge': 'top'}");
     double all[60], from[15];
     const int32_t top[5] = {0, 1, 2, 3, 4};
     send(&h, 4 * FRAME, 0.02, 0.01, 20);
@@ -326,17 +301,13 @@ START_TEST(changed_pins_ride_from_where_they_are)
     good(&h, drape_sim_advance(h.sim, 12 * FRAME));
     expect_on_body(&h, top, 5, from, -0.05, 0, 45);
     drape_sim_destroy(&h.sim);
-    close_scene(&fixed, &other);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- A state that is set ---- */
 
-START_TEST(a_state_has_its_pins_on_the_body)
+TEST(a_state_has_its_pins_on_the_body)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be", "{'edge': 'top', 'attach': 'body'}");
+    scoped_host h = open_sheet("be", "{'edge': 'top', 'attach': 'body'}");
     double x[60], v[60];
     send(&h, 4 * FRAME, 0.02, 0.01, 20);
     good(&h, drape_sim_advance(h.sim, 4 * FRAME));
@@ -348,17 +319,14 @@ START_TEST(a_state_has_its_pins_on_the_body)
     ck_assert_int_eq(drape_sim_attached(h.sim, 0), 0);
     x[0] += 0.01;
     says(&h, drape_sim_set_state(h.sim, 4 * FRAME, x, v), DRAPE_E_ARGUMENT, "node 0 of cloth0 is at");
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Refused ---- */
 
 /* Each allocation fails once: then nothing has changed. */
-START_TEST(without_memory_nothing_changes)
+TEST(without_memory_nothing_changes)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be", "{'edge': 'top', 'attach': 'body'}");
+    scoped_host h = open_sheet("be", "{'edge': 'top', 'attach': 'body'}");
     const int32_t nodes[2] = {12, 0};
     good(&h, drape_sim_advance(h.sim, 4 * FRAME));
     for (int kind = 0; kind < 2; kind++) {
@@ -366,10 +334,10 @@ START_TEST(without_memory_nothing_changes)
         drape_status status = DRAPE_E_MEMORY;
         long n = 1;
         for (; status == DRAPE_E_MEMORY; n++) {
-            memory.fail_at = memory.calls + n;
+            h.memory->fail_at = h.memory->calls + n;
             status = kind == 0 ? drape_sim_attach(h.sim, 1, 2, nodes, NULL)
                                : drape_sim_detach(h.sim, 1, nodes + 1);
-            memory.fail_at = 0;
+            h.memory->fail_at = 0;
             if (!status)
                 break;
             ck_assert_int_eq(status, DRAPE_E_MEMORY);
@@ -381,11 +349,4 @@ START_TEST(without_memory_nothing_changes)
         ck_assert_int_gt(n, 3);
     }
     good(&h, drape_sim_advance(h.sim, 8 * FRAME));
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("attach", nodes_are_attached_and_detached, pins_of_a_moving_body_begin_with_its_velocity,
-      a_pin_that_is_sent_leaves_its_body, checkpoints_keep_what_is_attached, placed_cloth_rides_on,
-      a_body_that_is_sent_far_takes_its_cloth_along, changed_pins_ride_from_where_they_are,
-      a_state_has_its_pins_on_the_body, without_memory_nothing_changes)

@@ -13,16 +13,15 @@ typedef struct changing {
     drape_scene *scene;
 } changing;
 
-static changing open_changing(failing_allocator *memory, const char *method, const char *text)
+static changing open_changing(const char *method, const char *text)
 {
     char copy[4096];
-    changing c = {.h = {.ctx = failing_context(memory)}};
-    drape_sim_def def;
+    changing c = {.h = empty_host()};
+    drape_sim_def def = sim_def();
     size_t n = 0;
     for (; text[n] && n + 1 < sizeof copy; n++)
         copy[n] = (char)(text[n] == '\'' ? '"' : text[n]);
     copy[n] = 0;
-    drape_sim_def_init(&def, sizeof def);
     def.integrator = method;
     def.dt = strcmp(method, "verlet") == 0 ? FRAME / 64 : FRAME / 2;
     good(&c.h, drape_scene_parse(c.h.ctx, copy, "s.json", &c.scene));
@@ -31,11 +30,13 @@ static changing open_changing(failing_allocator *memory, const char *method, con
     return c;
 }
 
-static void close_changing(changing *c, failing_allocator *memory)
+static void close_changing(changing *c)
 {
     drape_scene_destroy(&c->scene);
-    close_scene(&c->h, memory);
+    close_scene(&c->h);
 }
+
+#define scoped_changing SCOPED(close_changing) changing
 
 static void set(const changing *c, const char *pointer, const char *value)
 {
@@ -77,12 +78,10 @@ static const char hanging[] = "{'drape': 1, 'cloth': [{" CLOTH ", 'pins': [{'edg
 /* Through a change to the same model a sim has the same state to the bit, energies to rounding, and it goes
  * on as without: a one-step method to the bit, also in contact; the others start anew with a smaller step or
  * order, within their error. */
-START_TEST(same_model_changes_nothing)
+TEST(same_model_changes_nothing)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0}, other = {0};
-        changing a = open_changing(&memory, methods[i], on_ball),
-                 b = open_changing(&other, methods[i], on_ball);
+        scoped_changing a = open_changing(methods[i], on_ball), b = open_changing(methods[i], on_ball);
         const size_t n = 3 * (size_t)nodes_of(&a);
         advance(&a, 12 * FRAME);
         advance(&b, 12 * FRAME);
@@ -112,15 +111,12 @@ START_TEST(same_model_changes_nothing)
         if (one_step)
             ck_assert_msg(most == 0, "%s: %g", methods[i], most);
         ck_assert_msg(most < 0.02, "%s: %g", methods[i], most);
-        close_changing(&a, &memory);
-        close_changing(&b, &other);
     }
 }
-END_TEST
 
 /* Nodes that supports hold, at rest and moving, along directions of space and oblique ones, keep their state
  * to the bit through a change to the same model, new masses and set_state with the sim's own arrays. */
-START_TEST(supports_keep_their_velocities)
+TEST(supports_keep_their_velocities)
 {
     static const char *const holds[] = {"'normal': [1, 0, 0]", "'normal': [1, 0, 0.2]",
                                         "'axis': [1, 0.3, 0.2]"};
@@ -128,12 +124,11 @@ START_TEST(supports_keep_their_velocities)
     for (int i = 0; i < METHODS; i++)
         for (int k = 0; k < 6; k++) {
             char text[1024];
-            failing_allocator memory = {0};
             snprintf(text, sizeof text,
                      "{'drape': 1, 'cloth': [{" CLOTH ", 'pins': [{'corner': 'top-left'}, {'edge': 'right', "
                      "%s%s}]}], 'integrator': {'rtol': 1e-5}, 'frame_rate': 64, 'duration': 1}",
                      holds[k % 3], tracks[k / 3]);
-            changing c = open_changing(&memory, methods[i], text);
+            scoped_changing c = open_changing(methods[i], text);
             const size_t size = 3 * (size_t)nodes_of(&c) * sizeof(double);
             const int32_t node = 7;
             double mass = 1e-3, x[60], v[60];
@@ -158,20 +153,17 @@ START_TEST(supports_keep_their_velocities)
             good(&c.h, drape_sim_change(c.h.sim, c.scene));
             for (int j = 4; j < 20; j += 5)
                 ck_assert_double_eq(drape_sim_velocities(c.h.sim)[3 * j + 1], 0);
-            close_changing(&c, &memory);
         }
 }
-END_TEST
 
 /* ---- Gravity and materials ---- */
 
 /* Springs have an energy in proportion to Young's modulus. The change adds to the energy, and as the host
  * gave that, nothing to the numerical dissipation; the guard against energy out of nothing has no alarm in
  * the steps after. */
-START_TEST(a_stiffer_cloth_has_the_energy_of_its_strain)
+TEST(a_stiffer_cloth_has_the_energy_of_its_strain)
 {
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", hanging);
+    scoped_changing c = open_changing("be", hanging);
     advance(&c, 16 * FRAME);
     const drape_energy before = drape_sim_energy(c.h.sim);
     set(&c, "/cloth/0/material/young_modulus", "1e6");
@@ -183,13 +175,11 @@ START_TEST(a_stiffer_cloth_has_the_energy_of_its_strain)
     advance(&c, 16 * FRAME);
     ck_assert_int_eq((int)drape_sim_statistics(c.h.sim).steps_rejected, 0);
     ck_assert_double_gt(drape_sim_energy(c.h.sim).numerical, after.numerical);
-    close_changing(&c, &memory);
 }
-END_TEST
 
 /* What goes on is the same as in a sim that had the value from the start and was put into the state: backward
  * Euler to the bit. */
-START_TEST(goes_on_as_with_the_value_from_the_start)
+TEST(goes_on_as_with_the_value_from_the_start)
 {
     static const char *const changes[][2] = {
         {"/gravity", "[1, -5, 0.5]"},
@@ -207,8 +197,7 @@ START_TEST(goes_on_as_with_the_value_from_the_start)
         {"/cloth/0/pins/-", "{\"corner\": \"bottom-right\"}"},
         {"/cloth/0/pins", "[]"}};
     for (size_t i = 0; i < sizeof changes / sizeof *changes; i++) {
-        failing_allocator memory = {0}, other = {0};
-        changing a = open_changing(&memory, "be", on_ball), b = open_changing(&other, "be", on_ball);
+        scoped_changing a = open_changing("be", on_ball), b = open_changing("be", on_ball);
         const int32_t corner = 19;
         advance(&a, 8 * FRAME);
         set(&a, changes[i][0], changes[i][1]);
@@ -217,8 +206,7 @@ START_TEST(goes_on_as_with_the_value_from_the_start)
         drape_model_destroy(&b.h.model);
         drape_sim_destroy(&b.h.sim);
         good(&b.h, drape_scene_compile(b.scene, &b.h.model));
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        drape_sim_def def = sim_def();
         def.dt = FRAME / 2;
         good(&b.h, drape_sim_create(b.h.ctx, b.h.model, &def, &b.h.sim));
         if (drape_model_pinned(b.h.model)[corner]) /* it is pinned where it is, not where it began */
@@ -231,11 +219,8 @@ START_TEST(goes_on_as_with_the_value_from_the_start)
         ck_assert_msg(memcmp(drape_sim_positions(a.h.sim), drape_sim_positions(b.h.sim),
                              3 * (size_t)nodes_of(&a) * sizeof(double)) == 0,
                       "%s", changes[i][0]);
-        close_changing(&a, &memory);
-        close_changing(&b, &other);
     }
 }
-END_TEST
 
 /* ---- Colliders ---- */
 
@@ -250,10 +235,9 @@ static double lowest(const changing *c)
 /* A floor that is put below a falling sheet catches it; friction that is taken away lets it slide: on a
  * plane of slope 1 : 2 with g sin a = 9.81 / sqrt(5) m/s2, as the normal forces have no part along the
  * plane. A floor that is taken away lets it fall. */
-START_TEST(floors_come_and_go)
+TEST(floors_come_and_go)
 {
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", free_sheet);
+    scoped_changing c = open_changing("be", free_sheet);
     set(&c, "/cloth/0/velocity", "[0,0,0]");
     set(&c, "/cloth/0/mesh/orientation", "\"horizontal\"");
     drape_model_destroy(&c.h.model);
@@ -292,9 +276,7 @@ START_TEST(floors_come_and_go)
     ck_assert_int_eq(drape_model_collider_count(drape_sim_model(c.h.sim)), 0);
     advance(&c, 32 * FRAME);
     ck_assert_double_lt(lowest(&c), height - 9.81 / 2 * 0.5 * 0.5);
-    close_changing(&c, &memory);
 }
-END_TEST
 
 /* ---- Pins ---- */
 
@@ -315,10 +297,9 @@ static void mean_velocity(const changing *c, double mean[3])
 
 /* Without its pins a sheet falls freely: its centre of mass gains g t. A pinned node stays where it is to
  * the bit, and pins that carry a sheet at rest have its weight. */
-START_TEST(pins_come_and_go)
+TEST(pins_come_and_go)
 {
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", hanging);
+    scoped_changing c = open_changing("be", hanging);
     const int32_t top[] = {0, 1, 2, 3, 4}, two[] = {7, 13};
     double before[3], after[3], held[2][3], forces[60];
     advance(&c, 4 * FRAME);
@@ -332,7 +313,7 @@ START_TEST(pins_come_and_go)
     good(&c.h, drape_sim_pin(c.h.sim, 2, two));
     for (int i = 0; i < 2; i++)
         memcpy(held[i], drape_sim_positions(c.h.sim) + 3 * (size_t)two[i], sizeof held[i]);
-    bytes kept = bytes_save(c.h.sim);
+    scoped_bytes kept = bytes_save(c.h.sim);
     advance(&c, 8 * FRAME);
     for (int i = 0; i < 2; i++)
         ck_assert_mem_eq(held[i], drape_sim_positions(c.h.sim) + 3 * (size_t)two[i], sizeof held[i]);
@@ -348,10 +329,7 @@ START_TEST(pins_come_and_go)
     good(&c.h, drape_sim_restore_from(c.h.sim, kept.data, kept.size));
     advance(&c, 8 * FRAME);
     ck_assert(drape_sim_hash(c.h.sim) == hash);
-    free(kept.data);
-    close_changing(&c, &memory);
 }
-END_TEST
 
 /* ---- What else goes on ---- */
 
@@ -362,10 +340,9 @@ static drape_status count_frames(void *user, const drape_event *event)
 }
 
 /* Loads, frames, events by name and the length of a budget's frame. */
-START_TEST(the_rest_goes_on)
+TEST(the_rest_goes_on)
 {
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", hanging);
+    scoped_changing c = open_changing("be", hanging);
     const int32_t dragged[] = {17, 12};
     const double targets[] = {0.3, -0.2, 0.4, 0.1, -0.1, 0.2}, stiffness[] = {2, 1};
     double push[60] = {0}, force[3], now[3];
@@ -392,13 +369,11 @@ START_TEST(the_rest_goes_on)
     ck_assert(drape_sim_hash(c.h.sim) == hash);
     advance(&c, 8 * FRAME);
     ck_assert_int_eq(frames, 17);
-    close_changing(&c, &memory);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
-START_TEST(refusals_leave_the_sim_as_it_was)
+TEST(refusals_leave_the_sim_as_it_was)
 {
     static const char *const wrong[][3] = {
         {"/cloth/0/mesh/rows", "5", "the meshes of cloth stay the same"},
@@ -410,8 +385,7 @@ START_TEST(refusals_leave_the_sim_as_it_was)
         {"/cloth/0/material/density", "-1", "/cloth/0/material/density"},
         {"/cloth/0/pins/0/track", "[[0, [0,0,1]]]", "a track that is new must begin where its nodes are"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        failing_allocator memory = {0};
-        changing c = open_changing(&memory, "be", on_ball);
+        scoped_changing c = open_changing("be", on_ball);
         advance(&c, 4 * FRAME);
         const uint64_t hash = drape_sim_hash(c.h.sim);
         const drape_model *model = drape_sim_model(c.h.sim);
@@ -420,16 +394,13 @@ START_TEST(refusals_leave_the_sim_as_it_was)
         ck_assert(drape_sim_hash(c.h.sim) == hash);
         ck_assert_ptr_eq(drape_sim_model(c.h.sim), model);
         advance(&c, FRAME);
-        close_changing(&c, &memory);
     }
 }
-END_TEST
 
 /* Each allocation of a change fails once: the sim is as it was, nothing leaks, and then it changes. */
-START_TEST(a_change_without_memory)
+TEST(a_change_without_memory)
 {
-    failing_allocator memory = {0};
-    changing c = open_changing(&memory, "be", on_ball);
+    scoped_changing c = open_changing("be", on_ball);
     advance(&c, 8 * FRAME);
     const uint64_t hash = drape_sim_hash(c.h.sim);
     const int32_t node = 19;
@@ -437,9 +408,9 @@ START_TEST(a_change_without_memory)
     for (int kind = 0; kind < 2; kind++) {
         drape_status status = DRAPE_E_MEMORY;
         for (long n = 1; status; n++) {
-            memory.fail_at = memory.calls + n;
+            c.h.memory->fail_at = c.h.memory->calls + n;
             status = kind == 0 ? drape_sim_change(c.h.sim, c.scene) : drape_sim_pin(c.h.sim, 1, &node);
-            memory.fail_at = 0;
+            c.h.memory->fail_at = 0;
             if (!status)
                 break;
             ck_assert(drape_sim_hash(c.h.sim) == hash);
@@ -448,11 +419,4 @@ START_TEST(a_change_without_memory)
         }
     }
     advance(&c, 2 * FRAME);
-    close_changing(&c, &memory);
 }
-END_TEST
-
-SUITE("change", same_model_changes_nothing, supports_keep_their_velocities,
-      a_stiffer_cloth_has_the_energy_of_its_strain, goes_on_as_with_the_value_from_the_start,
-      floors_come_and_go, pins_come_and_go, the_rest_goes_on, refusals_leave_the_sim_as_it_was,
-      a_change_without_memory)

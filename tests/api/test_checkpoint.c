@@ -16,30 +16,21 @@ static const char text[] =
     " \"pins\": [{\"nodes\": [0]}, {\"corner\": \"top-right\", \"track\": [[0, [0,0,0]], [1, [0,0.5,0]]]}]}],"
     " \"integrator\": {\"method\": \"%s\", \"dt\": 0.01}, \"duration\": 1, \"frame_rate\": 30}";
 
-static drape_context *make_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 static drape_model *make_model(drape_context *ctx, const char *integrator)
 {
     char whole[2048];
-    drape_scene *scene = NULL;
+    scoped_parsed *scene = NULL;
     drape_model *model = NULL;
     snprintf(whole, sizeof whole, text, integrator);
     ck_assert_int_eq(drape_scene_parse(ctx, whole, "s.json", &scene), DRAPE_OK);
-    ck_assert_msg(drape_scene_compile(scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
-    drape_scene_destroy(&scene);
+    assert_ok(ctx, drape_scene_compile(scene, &model));
     return model;
 }
 
 static drape_sim *make_sim(drape_context *ctx, const drape_model *model, int threads)
 {
     drape_sim *sim = NULL;
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.threads = threads;
     ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
     return sim;
@@ -53,7 +44,7 @@ static drape_status count_frames(void *user, const drape_event *event)
 
 /* Saves to a file and restores in another sim, of another model of the same scene, with a different number of
  * threads; observers stay registered. */
-START_TEST(a_file_is_taken_by_another_sim)
+TEST(a_file_is_taken_by_another_sim)
 {
     static const char *const integrators[] = {"be", "bdf2", "ida", "verlet", "dirk"};
     for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
@@ -67,9 +58,9 @@ START_TEST(a_file_is_taken_by_another_sim)
         ck_assert_int_eq(drape_sim_observe(sim, count_frames, &frames[0]), DRAPE_OK);
         ck_assert_int_eq(drape_sim_observe(other, count_frames, &frames[1]), DRAPE_OK);
         ck_assert_int_eq(drape_sim_advance(sim, 0.25), DRAPE_OK);
-        ck_assert_msg(drape_sim_save(sim, path) == DRAPE_OK, "%s", drape_context_message(ctx));
+        assert_ok(ctx, drape_sim_save(sim, path));
         int before = frames[0];
-        ck_assert_msg(drape_sim_restore(other, path) == DRAPE_OK, "%s", drape_context_message(second));
+        assert_ok(second, drape_sim_restore(other, path));
         ck_assert(drape_sim_time(other) == drape_sim_time(sim));
         ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(sim));
         ck_assert_int_eq(frames[1], 0);
@@ -86,7 +77,6 @@ START_TEST(a_file_is_taken_by_another_sim)
         unlink(path);
     }
 }
-END_TEST
 
 /* One model; in each thread a context and a sim, all restored from the same bytes. */
 typedef struct worker {
@@ -94,5 +84,3 @@ typedef struct worker {
     const bytes *from;
     uint64_t hash;
 } worker;
-
-SUITE("api/checkpoint", a_file_is_taken_by_another_sim)

@@ -51,7 +51,7 @@ static void open_fixture(fixture *f)
     *f = (fixture){.sim = NULL};
     ck_assert_int_eq(drape_context_create(NULL, &f->ctx), DRAPE_OK);
     ck_assert_int_eq(drape_scene_parse(f->ctx, text, "s.json", &scene), DRAPE_OK);
-    ck_assert_msg(drape_scene_compile(scene, &f->model) == DRAPE_OK, "%s", drape_context_message(f->ctx));
+    assert_ok(f->ctx, drape_scene_compile(scene, &f->model));
     drape_scene_destroy(&scene);
     ck_assert_int_eq(drape_sim_create(f->ctx, f->model, NULL, &f->sim), DRAPE_OK);
     ck_assert_int_eq(drape_sim_observe(f->sim, note, &f->seen), DRAPE_OK);
@@ -64,10 +64,11 @@ static void close_fixture(fixture *f)
     drape_context_destroy(&f->ctx);
 }
 
+#define scoped_fixture SCOPED(close_fixture) fixture
+
 static drape_event_def def_of(const char *name, const char *direction, const char *action)
 {
-    drape_event_def def;
-    drape_event_def_init(&def, sizeof def);
+    drape_event_def def = event_def();
     def.name = name;
     def.direction = direction;
     def.action = action;
@@ -78,8 +79,7 @@ static void add(fixture *f, const char *name, const char *direction, const char 
                 drape_event_function *function, void *user)
 {
     const drape_event_def def = def_of(name, direction, action);
-    ck_assert_msg(drape_sim_add_event(f->sim, &def, function, user) == DRAPE_OK, "%s",
-                  drape_context_message(f->ctx));
+    assert_ok(f->ctx, drape_sim_add_event(f->sim, &def, function, user));
 }
 
 /* f = t - the time of the user. */
@@ -108,9 +108,9 @@ static drape_status speed(void *user, double t, const double *x, const double *v
 }
 
 /* Free fall: y = y0 - 5 t^2, v = -10 t, which the implicit midpoint rule follows exactly. */
-START_TEST(a_function_is_located_and_reported)
+TEST(a_function_is_located_and_reported)
 {
-    fixture f;
+    scoped_fixture f;
     open_fixture(&f);
     const double y0 = drape_sim_positions(f.sim)[1];
     add(&f, "speed", NULL, NULL, speed, NULL);
@@ -126,16 +126,14 @@ START_TEST(a_function_is_located_and_reported)
     ck_assert(record.count == 1 && record.first == f.seen.time[0] && record.last == f.seen.time[0]);
     ck_assert(record.direction == 1 && strcmp(record.name, "speed") == 0);
     ck_assert_int_eq(drape_sim_stopped_by(f.sim), -1);
-    close_fixture(&f);
 }
-END_TEST
 
 /* The steps end at k 0.01 s: the end of the tenth is 0.1 s to the last bit. */
-START_TEST(a_root_at_the_end_of_a_step_counts_once)
+TEST(a_root_at_the_end_of_a_step_counts_once)
 {
     static const char *const actions[] = {"record", "stop"};
     for (int i = 0; i < 2; i++) {
-        fixture f;
+        scoped_fixture f;
         double at = 10 * 0.01;
         open_fixture(&f);
         add(&f, "clock", NULL, actions[i], clock_of, &at);
@@ -148,27 +146,23 @@ START_TEST(a_root_at_the_end_of_a_step_counts_once)
         }
         ck_assert_int_eq(f.seen.roots, 1);
         ck_assert_double_eq_tol(f.seen.time[0], at, 1e-12);
-        close_fixture(&f);
     }
 }
-END_TEST
 
-START_TEST(a_root_at_the_start_is_not_an_event)
+TEST(a_root_at_the_start_is_not_an_event)
 {
-    fixture f;
+    scoped_fixture f;
     double at = 0;
     open_fixture(&f);
     add(&f, "clock", NULL, "stop", clock_of, &at);
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.05), DRAPE_OK);
     ck_assert_int_eq(f.seen.roots, 0);
-    close_fixture(&f);
 }
-END_TEST
 
 /* Both roots lie between the same two of the evaluations that each step gets, 1/300 s apart. */
-START_TEST(two_roots_in_a_step_are_found)
+TEST(two_roots_in_a_step_are_found)
 {
-    fixture f;
+    scoped_fixture f;
     double at[2] = {0.1041, 0.1042};
     static const int32_t events[] = {0, 2, 0, 1};
     open_fixture(&f);
@@ -182,15 +176,13 @@ START_TEST(two_roots_in_a_step_are_found)
         ck_assert_int_eq(f.seen.direction[i], i < 2 ? -1 : 1);
         ck_assert_int_eq(f.seen.event[i], events[i]);
     }
-    close_fixture(&f);
 }
-END_TEST
 
 /* Reports are in order of time, whatever the order of the events; those after a stop are for later, and at
  * the same time all that act do. */
-START_TEST(events_are_in_order_of_time)
+TEST(events_are_in_order_of_time)
 {
-    fixture f;
+    scoped_fixture f;
     double late = 0.1047, early = 0.1011, stop = 0.1033;
     open_fixture(&f);
     add(&f, "late", NULL, NULL, clock_of, &late);
@@ -207,13 +199,11 @@ START_TEST(events_are_in_order_of_time)
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.2), DRAPE_OK);
     ck_assert(f.seen.roots == 4 && f.seen.event[3] == 0);
     ck_assert_double_eq_tol(f.seen.time[3], late, 1e-12);
-    close_fixture(&f);
 }
-END_TEST
 
-START_TEST(once_is_once)
+TEST(once_is_once)
 {
-    fixture f;
+    scoped_fixture f;
     double at[2] = {0.103, 0.111};
     open_fixture(&f);
     drape_event_def def = def_of("once", NULL, NULL);
@@ -222,9 +212,7 @@ START_TEST(once_is_once)
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.2), DRAPE_OK);
     ck_assert_int_eq(f.seen.roots, 1);
     ck_assert_double_eq_tol(f.seen.time[0], at[0], 1e-12);
-    close_fixture(&f);
 }
-END_TEST
 
 /* ---- Functions that fail ---- */
 
@@ -245,7 +233,7 @@ static drape_status refuse_at(void *user, double t, const double *x, const doubl
 }
 
 /* The state is the last accepted one, to the last bit, and a later advance goes on if the function does. */
-START_TEST(a_failing_function_ends_the_advance)
+TEST(a_failing_function_ends_the_advance)
 {
     static const struct {
         drape_status status;
@@ -260,7 +248,7 @@ START_TEST(a_failing_function_ends_the_advance)
         {DRAPE_OK, INFINITY, DRAPE_E_ARGUMENT, "t=0.1: the function of event \"fails\" is inf"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        fixture f, plain;
+        scoped_fixture f, plain;
         failing user = {.status = cases[i].status, .value = cases[i].value, .from = 0.0999999};
         open_fixture(&f);
         open_fixture(&plain);
@@ -273,28 +261,23 @@ START_TEST(a_failing_function_ends_the_advance)
         ck_assert_int_eq(drape_sim_advance(f.sim, 0.2), DRAPE_OK);
         ck_assert_int_eq(drape_sim_advance(plain.sim, 0.2), DRAPE_OK);
         ck_assert(drape_sim_hash(f.sim) == drape_sim_hash(plain.sim));
-        close_fixture(&plain);
-        close_fixture(&f);
     }
 }
-END_TEST
 
-START_TEST(the_message_of_a_function_is_kept)
+TEST(the_message_of_a_function_is_kept)
 {
-    fixture f;
+    scoped_fixture f;
     failing user = {.status = DRAPE_E_FILE, .from = 0.05};
     open_fixture(&f);
     user.says = f.ctx;
     add(&f, "fails", NULL, NULL, refuse_at, &user);
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.2), DRAPE_E_FILE);
     ck_assert_str_eq(drape_context_message(f.ctx), "the host said so");
-    close_fixture(&f);
 }
-END_TEST
 
-START_TEST(wrong_events_are_refused)
+TEST(wrong_events_are_refused)
 {
-    fixture f;
+    scoped_fixture f;
     double at = 0.1;
     open_fixture(&f);
     add(&f, "clock", NULL, NULL, clock_of, &at);
@@ -326,39 +309,32 @@ START_TEST(wrong_events_are_refused)
     ck_assert_int_eq(drape_sim_add_event(f.sim, &def, clock_of, &at), DRAPE_E_VERSION);
     ck_assert_int_eq(drape_sim_event(f.sim, 0, NULL), 1);
     ck_assert_int_eq(drape_sim_event(NULL, 0, NULL), 0);
-    close_fixture(&f);
 }
-END_TEST
 
 /* A restored sim keeps the functions of its host, and needs as many events as the saved one had. */
-START_TEST(a_checkpoint_needs_the_same_events)
+TEST(a_checkpoint_needs_the_same_events)
 {
-    fixture f, other;
+    scoped_fixture f, other;
     double at = 0.1;
     open_fixture(&f);
     open_fixture(&other);
     add(&f, "clock", NULL, NULL, clock_of, &at);
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.15), DRAPE_OK);
-    bytes saved = bytes_save(f.sim);
+    scoped_bytes saved = bytes_save(f.sim);
     ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_E_ARGUMENT);
     add(&other, "clock", NULL, NULL, clock_of, &at);
-    ck_assert_msg(drape_sim_restore_from(other.sim, saved.data, saved.size) == DRAPE_OK, "%s",
-                  drape_context_message(other.ctx));
+    assert_ok(other.ctx, drape_sim_restore_from(other.sim, saved.data, saved.size));
     drape_event_record record;
     ck_assert_int_eq(drape_sim_event(other.sim, 0, &record), 1);
     ck_assert(record.count == 1 && record.first == f.seen.time[0]);
     ck_assert_int_eq(drape_sim_advance(other.sim, 0.2), DRAPE_OK);
     ck_assert_int_eq(other.seen.roots, 0);
-    free(saved.data);
-    close_fixture(&other);
-    close_fixture(&f);
 }
-END_TEST
 
 /* A state that is set is a beginning: there is no root between it and the state before. */
-START_TEST(a_state_that_is_set_has_no_root_before_it)
+TEST(a_state_that_is_set_has_no_root_before_it)
 {
-    fixture f;
+    scoped_fixture f;
     double at = 0.1;
     open_fixture(&f);
     add(&f, "clock", NULL, NULL, clock_of, &at);
@@ -367,14 +343,12 @@ START_TEST(a_state_that_is_set_has_no_root_before_it)
                      DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(f.sim, 0.3), DRAPE_OK);
     ck_assert_int_eq(f.seen.roots, 0);
-    close_fixture(&f);
 }
-END_TEST
 
 /* Even without a budget a call ends at the event, since the location of a root is not left to the next. */
-START_TEST(a_stop_ends_a_call_with_a_budget)
+TEST(a_stop_ends_a_call_with_a_budget)
 {
-    fixture f;
+    scoped_fixture f;
     double at = 0.1033;
     drape_realtime report;
     drape_status status = DRAPE_OK;
@@ -387,12 +361,4 @@ START_TEST(a_stop_ends_a_call_with_a_budget)
     ck_assert_int_eq(drape_sim_stopped_by(f.sim), 0);
     ck_assert_int_eq(drape_sim_advance_realtime(f.sim, 1 / 60.0, 1, &report), DRAPE_OK);
     ck_assert_int_eq(f.seen.roots, 1);
-    close_fixture(&f);
 }
-END_TEST
-
-SUITE("events", a_function_is_located_and_reported, a_root_at_the_end_of_a_step_counts_once,
-      a_root_at_the_start_is_not_an_event, two_roots_in_a_step_are_found, events_are_in_order_of_time,
-      once_is_once, a_failing_function_ends_the_advance, the_message_of_a_function_is_kept,
-      wrong_events_are_refused, a_checkpoint_needs_the_same_events, a_state_that_is_set_has_no_root_before_it,
-      a_stop_ends_a_call_with_a_budget)

@@ -40,15 +40,13 @@ static drape_status watch_pin(void *user, const drape_event *event)
 
 /* A fixed pin and one on a track, moved along a straight line by the host: at the end they are at the target
  * to the bit, in between on the line up to rounding (1 m, some ten operations), and afterwards they stay. */
-START_TEST(pins_go_where_they_are_sent)
+TEST(pins_go_where_they_are_sent)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        host h = open_scene(
-            &memory, SHEET, "",
+        scoped_host h = open_scene(
+            SHEET, "",
             "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0, [0,0,0]], [9, [0,0,9]]]}", "", "");
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        drape_sim_def def = sim_def();
         def.integrator = methods[i];
         def.dt = FRAME / 4;
         def.frame_rate = 4 / FRAME;
@@ -74,20 +72,17 @@ START_TEST(pins_go_where_they_are_sent)
         memcpy(at, drape_sim_positions(h.sim), sizeof at);
         good(&h, drape_sim_advance(h.sim, 6 * FRAME));
         ck_assert(memcmp(drape_sim_positions(h.sim), at, sizeof at) == 0);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and
  * restarts no integrator: ida, which restarts at every kink, takes fewer steps than with straight paths. */
-START_TEST(velocities_make_a_motion_smooth)
+TEST(velocities_make_a_motion_smooth)
 {
     const double a = 0.05, w = 9;
     double steps[2], worst[2] = {0, 0};
     for (int straight = 0; straight < 2; straight++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "'method': 'ida', 'rtol': 1e-4", "");
+        scoped_host h = open_scene(SHEET, "", "{'edge': 'top'}", "'method': 'ida', 'rtol': 1e-4", "");
         const int32_t node = 2;
         const double *rest = drape_model_rest_positions(h.model) + 6;
         for (int f = 1; f <= 32; f++) {
@@ -102,20 +97,17 @@ START_TEST(velocities_make_a_motion_smooth)
             }
         }
         steps[straight] = (double)drape_sim_statistics(h.sim).steps_accepted;
-        close_scene(&h, &memory);
     }
     ck_assert_double_le(worst[0], a * pow(w * FRAME, 4) / 384 * (1 + 1e-6));
     ck_assert_double_le(worst[1], a * pow(w * FRAME, 2) / 8 * (1 + 1e-6));
     ck_assert_double_ge(worst[1], 10 * worst[0]);
     ck_assert_msg(steps[0] < 0.7 * steps[1], "smooth %g steps, straight %g", steps[0], steps[1]);
 }
-END_TEST
 
 /* After the host has moved a pin, a state that the host sets may have it anywhere. */
-START_TEST(a_state_takes_moved_pins_along)
+TEST(a_state_takes_moved_pins_along)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "", "");
+    scoped_host h = open_scene(SHEET, "", "{'edge': 'top'}", "", "");
     const int32_t node = 1;
     double x[60], v[60] = {0}, to[3] = {0.125, 0.1, 0};
     memcpy(x, drape_sim_positions(h.sim), sizeof x);
@@ -127,9 +119,7 @@ START_TEST(a_state_takes_moved_pins_along)
     ck_assert(memcmp(drape_sim_positions(h.sim), x, sizeof x) == 0);
     good(&h, drape_sim_advance(h.sim, FRAME));
     ck_assert(memcmp(drape_sim_positions(h.sim) + 3, x + 3, 3 * sizeof *x) == 0);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Colliders ---- */
 
@@ -140,7 +130,7 @@ END_TEST
 
 /* As with pins: a ball that the host moves from key to key behaves as one on the track. The stiffness is
  * given, because its default depends on the speed of tracks. */
-START_TEST(a_collider_goes_where_it_is_sent)
+TEST(a_collider_goes_where_it_is_sent)
 {
     static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",
                                            "'method': 'verlet', 'dt': 0.0078125"};
@@ -150,9 +140,8 @@ START_TEST(a_collider_goes_where_it_is_sent)
         snprintf(moving, sizeof moving, BALL STIFFNESS,
                  ", 'track': [[0, [0,0,0]], [0.125, [0,0,-0.1]], [0.25, [0,0.05,-0.12]]]");
         snprintf(still, sizeof still, BALL STIFFNESS, "");
-        failing_allocator memory[2] = {{0}, {0}};
-        host on = open_scene(&memory[0], SHEET, "", "{'edge': 'top'}", settings[i], moving),
-             by = open_scene(&memory[1], SHEET, "", "{'edge': 'top'}", settings[i], still);
+        scoped_host on = open_scene(SHEET, "", "{'edge': 'top'}", settings[i], moving),
+                    by = open_scene(SHEET, "", "{'edge': 'top'}", settings[i], still);
         for (int k = 0; k < 2; k++) {
             double worst = 0;
             good(&by, drape_sim_move_collider(by.sim, 0, 0.125, keys[k], NULL));
@@ -167,21 +156,17 @@ START_TEST(a_collider_goes_where_it_is_sent)
             ck_assert_str_eq(at.type, "sphere");
         }
         ck_assert_double_gt(fabs(drape_sim_positions(by.sim)[3 * 17 + 2]), 0.01); /* the sheet touched it */
-        close_scene(&on, &memory[0]);
-        close_scene(&by, &memory[1]);
     }
 }
-END_TEST
 
 /* ---- Forces ---- */
 
 /* Reactions of the pins balance the weight and the push: their sum is the weight of all nodes less the push,
  * up to the residuals of 16 free nodes at 1e-8 N. */
-START_TEST(reactions_carry_the_weight)
+TEST(reactions_carry_the_weight)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}",
-                        "'method': 'static', 'tolerance': 1e-8", "");
+    scoped_host h = open_scene(SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}",
+                               "'method': 'static', 'tolerance': 1e-8", "");
     double push[60] = {0}, forces[60], mass = 0;
     for (int n = 0; n < 20; n++)
         mass += drape_model_masses(h.model)[n];
@@ -202,18 +187,14 @@ START_TEST(reactions_carry_the_weight)
         if (!pushed) /* the diagonals alternate, so the sheet is its own mirror image */
             ck_assert_double_eq_tol(forces[1], forces[13], 1e-6);
     }
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A triangle without inner forces, pushed by F on each node: backward Euler gives v_n = n h F/m and x_n - x_0
  * = h^2 F/m n (n + 1)/2, so the energy F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100
  * operations on 1 m, 1 J. */
-START_TEST(a_push_does_its_work)
+TEST(a_push_does_its_work)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(
-        &memory,
+    scoped_host h = open_scene(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 1}, 'material': "
         "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}], 'gravity': "
         "[0,0,0], 'integrator': {'method': 'be', 'dt': 0.015625, 'tolerance': 1e-12}, 'duration': 1}");
@@ -236,18 +217,14 @@ START_TEST(a_push_does_its_work)
     good(&h, drape_sim_push(h.sim, NULL));
     good(&h, drape_sim_advance(h.sim, 2 * n * dt));
     ck_assert_double_eq_tol(drape_sim_velocities(h.sim)[1], n * dt * a, 1e-9);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* Pushes act in every integrator: a sheet under 1 g that is pushed up with 1 g floats. */
-START_TEST(every_integrator_is_pushed)
+TEST(every_integrator_is_pushed)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, SHEET, "", "", "", "");
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        scoped_host h = open_scene(SHEET, "", "", "", "");
+        drape_sim_def def = sim_def();
         def.integrator = methods[i];
         def.dt = FRAME / 4;
         drape_sim_destroy(&h.sim);
@@ -264,21 +241,18 @@ START_TEST(every_integrator_is_pushed)
         good(&h, drape_sim_push(h.sim, NULL));
         good(&h, drape_sim_advance(h.sim, 1));
         ck_assert_msg(drape_sim_positions(h.sim)[1] < -0.5, "%s", methods[i]);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* With springs only, verlet sums the forces itself and not through the system: pushes and drag springs act
  * there too. */
-START_TEST(springs_of_verlet_are_pushed_and_pulled)
+TEST(springs_of_verlet_are_pushed_and_pulled)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(
-        &memory, "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1, "
-                 "'height': 1}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, "
-                 "'terms': [{'type': 'spring.structural', 'stiffness': 10}]}], 'integrator': {'method': "
-                 "'verlet', 'dt': 0.005}, 'duration': 1}");
+    scoped_host h =
+        open_scene("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1, "
+                   "'height': 1}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, "
+                   "'terms': [{'type': 'spring.structural', 'stiffness': 10}]}], 'integrator': {'method': "
+                   "'verlet', 'dt': 0.005}, 'duration': 1}");
     double push[243];
     for (int k = 0; k < 243; k++)
         push[k] = k % 3 == 1 ? 9.81 * drape_model_masses(h.model)[k / 3] : 0;
@@ -290,21 +264,18 @@ START_TEST(springs_of_verlet_are_pushed_and_pulled)
     good(&h, drape_sim_set_drag_spring(h.sim, 40, 1, (const double[]){0.5, 0.5, -0.5}));
     good(&h, drape_sim_advance(h.sim, 0.2));
     ck_assert_double_gt(drape_sim_positions(h.sim)[3 * 40 + 1], 0.01);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A sheet on a table is carried by the table, up to the residuals of 20 nodes at 1e-8 N; the force along the
  * table is friction. */
-START_TEST(contact_carries_the_weight)
+TEST(contact_carries_the_weight)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(
-        &memory, "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': "
-                 "0.5, 'height': 0.4, 'transform': {'translate': [0, 0.0005, 0]}}, 'material': "
-                 "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', "
-                 "'bend.hinge']}], 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': "
-                 "[0,1,0]}], 'integrator': {'method': 'static', 'tolerance': 1e-8}, 'duration': 1}");
+    scoped_host h =
+        open_scene("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': "
+                   "0.5, 'height': 0.4, 'transform': {'translate': [0, 0.0005, 0]}}, 'material': "
+                   "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', "
+                   "'bend.hinge']}], 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': "
+                   "[0,1,0]}], 'integrator': {'method': 'static', 'tolerance': 1e-8}, 'duration': 1}");
     double forces[60], on[3], sum[3] = {0}, mass = 0;
     good(&h, drape_sim_contact_forces(h.sim, forces)); /* before any step, too */
     good(&h, drape_sim_advance(h.sim, 1));
@@ -322,9 +293,7 @@ START_TEST(contact_carries_the_weight)
     good(&h, drape_sim_reactions(h.sim, forces));
     for (int i = 0; i < 60; i++)
         ck_assert(forces[i] == 0); /* no pins */
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Wind ---- */
 
@@ -358,11 +327,10 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
  *     v1 = (v0 + h k w(t1))/(1 + h k).
  * Tolerance: a residual of 1e-12 N on at least 0.03 kg changes v by h r/m < 1e-12 m/s per step, in 16
  * steps. */
-START_TEST(wind_takes_cloth_along)
+TEST(wind_takes_cloth_along)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, DRAG, "{'type': 'drag.viscous', 'coefficient': 0.5}", "be",
-                        ", 'tolerance': 1e-12");
+    scoped_host h =
+        open_scene(DRAG, "{'type': 'drag.viscous', 'coefficient': 0.5}", "be", ", 'tolerance': 1e-12");
     field f = {.w0 = {1, -2, 0.5}, .w1 = {3, 0, -1}};
     double v[3] = {0}, k = 0.5 / 0.2;
     good(&h, drape_sim_set_wind(h.sim, blow, &f));
@@ -375,9 +343,7 @@ START_TEST(wind_takes_cloth_along)
         }
     }
     ck_assert_int_gt(f.calls, 16);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Cancelling ---- */
 
@@ -399,14 +365,12 @@ static void still_air(void *user, double t, int32_t count, const double *x, doub
 
 /* A cancelled step is rolled back: the state is the one before it, and the next advance repeats the same
  * step. */
-START_TEST(a_step_can_be_cancelled)
+TEST(a_step_can_be_cancelled)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
         char method[64];
         snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
-        host h =
-            open_scene(&memory, SHEET, ", {'type': 'drag.viscous', 'coefficient': 0.1}", pins, method, "");
+        scoped_host h = open_scene(SHEET, ", {'type': 'drag.viscous', 'coefficient': 0.1}", pins, method, "");
         trigger t = {.sim = h.sim};
         good(&h, drape_sim_set_wind(h.sim, still_air, &t));
         good(&h, drape_sim_advance(h.sim, 0.125));
@@ -426,10 +390,8 @@ START_TEST(a_step_can_be_cancelled)
         }
         good(&h, drape_sim_advance(h.sim, 0.25));
         ck_assert_double_eq(drape_sim_time(h.sim), 0.25);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 static drape_sim *volatile signalled;
 
@@ -460,13 +422,12 @@ static void *cancel_by_thread(void *main_thread)
 }
 
 /* Cancels an advance that would take hours, from a signal handler and from another thread. */
-START_TEST(a_signal_and_a_thread_can_cancel)
+TEST(a_signal_and_a_thread_can_cancel)
 {
     pthread_t here = pthread_self(), thread;
     ck_assert(signal(SIGALRM, on_alarm) != SIG_ERR);
     for (int by_signal = 0; by_signal < 2; by_signal++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, SHEET, "", pins, "", "");
+        scoped_host h = open_scene(SHEET, "", pins, "", "");
         signalled = h.sim;
         attempts = 0;
         good(&h, drape_sim_observe(h.sim, count_attempt, NULL));
@@ -474,19 +435,16 @@ START_TEST(a_signal_and_a_thread_can_cancel)
         says(&h, drape_sim_advance(h.sim, 1e8), DRAPE_E_STOPPED, "cancelled");
         ck_assert_int_eq(pthread_join(thread, NULL), 0);
         ck_assert_double_gt(drape_sim_time(h.sim), 0);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* ---- Reading ---- */
 
 /* Normals of a sheet in the plane z = 0, rows downwards, are its normal; those of a bent sheet are unit
  * vectors; a sheet collapsed to a point has none. */
-START_TEST(normals_are_of_length_one)
+TEST(normals_are_of_length_one)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", pins, "", "");
+    scoped_host h = open_scene(SHEET, "", pins, "", "");
     double n[60], point[60] = {0}, first = 0;
     drape_sim_normals(h.sim, n);
     first = n[2];
@@ -510,9 +468,7 @@ START_TEST(normals_are_of_length_one)
         ck_assert(n[i] == 0);
     drape_sim_normals(NULL, n);
     drape_sim_normals(h.sim, NULL);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Together ---- */
 
@@ -576,21 +532,20 @@ static drape_status look(void *user, const drape_event *event)
  * forces of the state that the sim has then, the same as the host reads after the advance; and reading leaves
  * no trace: the run has the same bits as one whose observer only looks. A ball is driven into a sheet that
  * swings, with large steps, of which some are rejected. */
-START_TEST(observers_read_forces)
+TEST(observers_read_forces)
 {
     int rejected = 0;
     for (int i = 0; i < 2 * METHODS; i++) {
         const char *method = methods[i / 2], *friction = i % 2 ? "lagged" : "implicit";
         const bool pushes = strcmp(method, "verlet") != 0;
         char rest[512], choice[256];
-        failing_allocator memory = {0}, other = {0};
         snprintf(rest, sizeof rest, BALL, ", 'track': [[0, [0,0,0]], [0.25, [0,0,-0.2]]]");
         snprintf(rest + strlen(rest), sizeof rest - strlen(rest),
                  " 'contact': {'friction': '%s'}, 'events': [{'type': 'height', 'height': -0.4}],", friction);
         snprintf(choice, sizeof choice, "'method': '%s', 'tolerance': 1e-9%s", method,
                  pushes ? ", 'dt': 0.03125, 'max_iterations': 12" : ", 'dt': 0.0005");
-        host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}", choice, rest),
-             plain = open_scene(&other, SHEET, "", "{'corner': 'top-left'}", choice, rest);
+        scoped_host h = open_scene(SHEET, "", "{'corner': 'top-left'}", choice, rest),
+                    plain = open_scene(SHEET, "", "{'corner': 'top-left'}", choice, rest);
         reader r = {.h = &h, .pushes = pushes};
         reading after;
         ck_assert_int_eq(drape_model_node_count(h.model), 20);
@@ -609,19 +564,16 @@ START_TEST(observers_read_forces)
         ck_assert_int_gt(r.events[DRAPE_EVENT_ROOT], 0);
         ck_assert(!pushes || r.contacts > 0);
         rejected += r.rejected;
-        close_scene(&h, &memory);
-        close_scene(&plain, &other);
     }
     ck_assert_int_gt(rejected, 10);
 }
-END_TEST
 
 /* One sim and the host that drives it. */
 static void *run_job(void *user)
 {
     job *j = user;
-    drape_context *ctx = NULL;
-    drape_sim *sim = NULL;
+    scoped_context *ctx = NULL;
+    scoped_sim *sim = NULL;
     field f = {.w0 = {j->index, 0, 1}};
     double forces[60];
     const int32_t node = 2;
@@ -634,19 +586,16 @@ static void *run_job(void *user)
               drape_sim_reactions(sim, forces) || drape_sim_contact_forces(sim, forces);
     }
     j->hash = bad ? 0 : drape_sim_hash(sim);
-    drape_sim_destroy(&sim);
-    drape_context_destroy(&ctx);
     return NULL;
 }
 
 /* Hosts in several threads on one model do not affect each other: each gets the same result as alone. */
-START_TEST(hosts_in_threads_share_a_model)
+TEST(hosts_in_threads_share_a_model)
 {
     enum { THREADS = 4 };
     char ball[256];
-    failing_allocator memory = {0};
     snprintf(ball, sizeof ball, BALL, "");
-    host h = open_scene(&memory, SHEET, ", 'drag.wind'", "{'edge': 'top'}", "", ball);
+    scoped_host h = open_scene(SHEET, ", 'drag.wind'", "{'edge': 'top'}", "", ball);
     pthread_t thread[THREADS];
     job jobs[THREADS], alone[THREADS];
     for (int i = 0; i < THREADS; i++) {
@@ -661,12 +610,4 @@ START_TEST(hosts_in_threads_share_a_model)
         ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
         ck_assert_uint_eq(jobs[i].hash, alone[i].hash);
     }
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("host", pins_go_where_they_are_sent, velocities_make_a_motion_smooth, a_state_takes_moved_pins_along,
-      a_collider_goes_where_it_is_sent, reactions_carry_the_weight, observers_read_forces,
-      a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
-      contact_carries_the_weight, wind_takes_cloth_along, a_step_can_be_cancelled,
-      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, hosts_in_threads_share_a_model)

@@ -33,7 +33,7 @@ static void lowest(const host *h, double low[2])
 /* From 0.1 m and 0.05 m, after 0.4 s: a sheet that falls freely has fallen 0.78 m; the table, at 0.02 m,
  * holds what touches it, and the floor, at 0, what does not touch the table. Verlet's rules cannot take
  * whole sheets that land flat on the floor or on each other: it has those on the table, and thin ones. */
-START_TEST(cloth_passes_through_what_it_ignores)
+TEST(cloth_passes_through_what_it_ignores)
 {
     static const struct {
         const char *upper, *lower, *floor, *table;
@@ -48,9 +48,8 @@ START_TEST(cloth_passes_through_what_it_ignores)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         for (int m = 0; m < 2 - (cases[i].upper_at == 0 || cases[i].lower_at == 0); m++) {
-            failing_allocator memory = {0};
-            host h = open_scene(&memory, two, cases[i].upper, cases[i].lower, cases[i].floor, cases[i].table,
-                                m ? "0.0002" : "0.005", m ? "verlet" : "be", m ? "0.0002" : "0.008");
+            scoped_host h = open_scene(two, cases[i].upper, cases[i].lower, cases[i].floor, cases[i].table,
+                                       m ? "0.0002" : "0.005", m ? "verlet" : "be", m ? "0.0002" : "0.008");
             double low[2];
             const drape_status status = drape_sim_advance(h.sim, 0.4);
             ck_assert_msg(!status, "case %zu, %s: %s", i, m ? "verlet" : "be", drape_context_message(h.ctx));
@@ -63,17 +62,14 @@ START_TEST(cloth_passes_through_what_it_ignores)
                 else
                     ck_assert_msg(low[c] > at[c] - 1e-3 && low[c] < 0.1, "case %zu, %s, cloth %d: %g m", i,
                                   m ? "verlet" : "be", c, low[c]);
-            close_scene(&h, &memory);
         }
 }
-END_TEST
 
 /* Where cloth is in what it ignores, it does not count as inside. */
-START_TEST(what_is_ignored_is_not_reported)
+TEST(what_is_ignored_is_not_reported)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, two, ", 'ignore': ['table', 'floor', 'lower']", "", "", "", "0.005", "be",
-                        "0.008");
+    scoped_host h =
+        open_scene(two, ", 'ignore': ['table', 'floor', 'lower']", "", "", "", "0.005", "be", "0.008");
     good(&h, drape_sim_advance(h.sim, 0.15)); /* amid both */
     ck_assert_int_eq(drape_sim_inside(h.sim, 0, NULL), 0);
     ck_assert_int_eq(drape_sim_inside(h.sim, 1, NULL), 0);
@@ -83,21 +79,17 @@ START_TEST(what_is_ignored_is_not_reported)
         if (drape_sim_warning(h.sim, i, &warning))
             ck_assert_msg(strstr(warning.text, "inside") == NULL, "%s", warning.text);
     }
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A collider that is switched off and on again in a running sim. */
-START_TEST(a_collider_is_switched)
+TEST(a_collider_is_switched)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, two, "", "", "", "", "0.005", "be", "0.008");
+    host h = open_scene(two, "", "", "", "", "0.005", "be", "0.008");
     char text[4096];
     drape_scene *scene = NULL;
     double low[2];
     snprintf(text, sizeof text, two, "", "", "", ", 'enabled': false", "0.005", "be", "0.008");
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(text);
     good(&h, drape_sim_advance(h.sim, 0.3));
     good(&h, drape_scene_parse(h.ctx, text, "s.json", &scene));
     good(&h, drape_sim_change(h.sim, scene));
@@ -112,29 +104,18 @@ START_TEST(a_collider_is_switched)
     lowest(&h, low);
     ck_assert_double_gt(low[1], 0.02);
     drape_scene_destroy(&scene);
-    close_scene(&h, &memory);
+    close_scene(&h);
 }
-END_TEST
 
-START_TEST(unknown_names)
+TEST(unknown_names)
 {
-    failing_allocator memory = {0};
-    drape_context *ctx = failing_context(&memory);
+    scoped_host h = empty_host();
     char text[4096];
     drape_scene *scene = NULL;
-    drape_model *model = NULL;
     snprintf(text, sizeof text, two, ", 'ignore': ['floor', 'chair']", "", "", "", "0.005", "be", "0.008");
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
-    ck_assert_int_eq(drape_scene_parse(ctx, text, "s.json", &scene), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_compile(scene, &model), DRAPE_E_ARGUMENT);
-    ck_assert_ptr_nonnull(
-        strstr(drape_context_message(ctx), "/cloth/0/ignore/1: there is no collider and no cloth \"chair\""));
+    quote(text);
+    ck_assert_int_eq(drape_scene_parse(h.ctx, text, "s.json", &scene), DRAPE_OK);
+    says(&h, drape_scene_compile(scene, &h.model), DRAPE_E_ARGUMENT,
+         "/cloth/0/ignore/1: there is no collider and no cloth \"chair\"");
     drape_scene_destroy(&scene);
-    drape_context_destroy(&ctx);
-    ck_assert_int_eq(memory.live, 0);
 }
-END_TEST
-
-SUITE("ignore", cloth_passes_through_what_it_ignores, what_is_ignored_is_not_reported, a_collider_is_switched,
-      unknown_names)

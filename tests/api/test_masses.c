@@ -33,17 +33,16 @@ static void advance(const host *h, double seconds)
 /* ---- Of a scene ---- */
 
 /* Items apply in their order, to each selected node once; everything else has the mass of the material. */
-START_TEST(masses_are_added_and_replaced)
+TEST(masses_are_added_and_replaced)
 {
-    failing_allocator memory = {0};
-    host plain = open_scene(&memory, ON_BALL, "");
+    host plain = open_scene(ON_BALL, "");
     double of_material[20];
     memcpy(of_material, masses_of(&plain), sizeof of_material);
-    close_scene(&plain, &memory);
-    host h = open_scene(&memory, ON_BALL,
-                        ", 'masses': [{'edge': 'bottom', 'add': 0.002}, {'nodes': [15, 3, 3], 'add': 0.5}, "
-                        "{'corner': 'bottom-right', 'mass': 0.125}, {'box': [[-1, -1, -0.01], [0.01, 1, 1]], "
-                        "'add': 0.25}, {'row': 1, 'mass': 0.0625}]");
+    close_scene(&plain);
+    scoped_host h = open_scene(
+        ON_BALL, ", 'masses': [{'edge': 'bottom', 'add': 0.002}, {'nodes': [15, 3, 3], 'add': 0.5}, "
+                 "{'corner': 'bottom-right', 'mass': 0.125}, {'box': [[-1, -1, -0.01], [0.01, 1, 1]], "
+                 "'add': 0.25}, {'row': 1, 'mass': 0.0625}]");
     const double *mass = masses_of(&h);
     for (int i = 0; i < 20; i++) {
         double expected = of_material[i];
@@ -54,25 +53,20 @@ START_TEST(masses_are_added_and_replaced)
         expected = i >= 5 && i < 10 ? 0.0625 : expected;
         ck_assert_msg(mass[i] == expected, "node %d: %.17g for %.17g", i, mass[i], expected);
     }
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* The same from structs, and what these refuse. */
-START_TEST(masses_from_structs)
+TEST(masses_from_structs)
 {
     const double x[] = {0, 0, 0, 1, 0, 0, 0, 0, 1};
     const int32_t triangle[] = {0, 2, 1}, node = 1;
     const drape_setting material[] = {{.name = "young_modulus", .number = 1e4},
                                       {.name = "thickness", .number = 1e-3},
                                       {.name = "total_mass", .number = 0.3}};
-    failing_allocator memory = {0};
-    host h = {.ctx = failing_context(&memory)};
-    drape_scene_def scene;
-    drape_cloth_def cloth;
+    scoped_host h = empty_host();
+    drape_scene_def scene = scene_def();
+    drape_cloth_def cloth = cloth_def();
     drape_mass_def mass;
-    drape_scene_def_init(&scene, sizeof scene);
-    drape_cloth_def_init(&cloth, sizeof cloth);
     drape_mass_def_init(&mass, sizeof mass);
     ck_assert(isnan(mass.add) && isnan(mass.mass));
     cloth.mesh.positions = x, cloth.mesh.node_count = 3;
@@ -95,25 +89,22 @@ START_TEST(masses_from_structs)
     good(&h, drape_model_create(h.ctx, &scene, &h.model));
     ck_assert_double_eq_tol(drape_model_masses(h.model)[0], 0.1, 1e-16);
     ck_assert_double_eq_tol(drape_model_masses(h.model)[1], 0.8, 1e-15);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- A running sim ---- */
 
 /* Masses given by a call go on as the same masses from a scene: weights, inertia, the stiffness of contact;
  * to the bit for the methods of one step, and so do all in a sim that is restored. */
-START_TEST(a_call_does_what_a_scene_does)
+TEST(a_call_does_what_a_scene_does)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0}, other = {0};
-        host a = open_scene(&memory, ON_BALL, ""),
-             b = open_scene(&other, ON_BALL,
-                            ", 'masses': [{'nodes': [7, 12], 'mass': 0.01}, {'nodes': [19], 'mass': 0.05}]");
+        scoped_host a = open_scene(ON_BALL, ""),
+                    b = open_scene(
+                        ON_BALL,
+                        ", 'masses': [{'nodes': [7, 12], 'mass': 0.01}, {'nodes': [19], 'mass': 0.05}]");
         const int32_t nodes[] = {7, 12, 19};
         const double heavy[] = {0.01, 0.01, 0.05};
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        drape_sim_def def = sim_def();
         def.integrator = methods[i];
         def.dt = strcmp(methods[i], "verlet") == 0 ? FRAME / 64 : FRAME / 2;
         drape_sim_destroy(&a.sim);
@@ -126,7 +117,7 @@ START_TEST(a_call_does_what_a_scene_does)
         advance(&a, 6 * FRAME);
         advance(&b, 6 * FRAME);
         ck_assert_msg(drape_sim_hash(a.sim) == drape_sim_hash(b.sim), "%s", methods[i]);
-        bytes kept = bytes_save(a.sim);
+        scoped_bytes kept = bytes_save(a.sim);
         advance(&a, 2 * FRAME);
         const uint64_t hash = drape_sim_hash(a.sim);
         drape_sim_destroy(&a.sim);
@@ -135,21 +126,16 @@ START_TEST(a_call_does_what_a_scene_does)
         ck_assert_mem_eq(masses_of(&a), masses_of(&b), 20 * sizeof(double));
         advance(&a, 2 * FRAME);
         ck_assert_msg(drape_sim_hash(a.sim) == hash, "%s", methods[i]);
-        free(kept.data);
-        close_scene(&a, &memory);
-        close_scene(&b, &other);
     }
 }
-END_TEST
 
 /* A flying sheet keeps its velocities to the bit; from then on its momentum is that of the new masses. The
  * kinetic energy that the masses bring counts as given by the host. The residual bound of 1e-9 N on 20 nodes
  * for 1/8 s. */
-START_TEST(velocities_stay_and_momentum_follows)
+TEST(velocities_stay_and_momentum_follows)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, "{'drape': 1, 'gravity': [0, 0, 0], 'cloth': [{" CLOTH
-                                 ", 'velocity': [1, 2, 0.5]}], " TO_GROUND);
+    scoped_host h = open_scene("{'drape': 1, 'gravity': [0, 0, 0], 'cloth': [{" CLOTH
+                               ", 'velocity': [1, 2, 0.5]}], " TO_GROUND);
     const int32_t nodes[] = {3, 11};
     const double masses[] = {0.03, 0.2};
     double v[60], p[3] = {0}, q[3] = {0}, kinetic = 0;
@@ -169,33 +155,25 @@ START_TEST(velocities_stay_and_momentum_follows)
         q[i % 3] += masses_of(&h)[i / 3] * drape_sim_velocities(h.sim)[i];
     for (int k = 0; k < 3; k++)
         ck_assert_double_eq_tol(q[k], p[k], 20 * 1e-9 / 8);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* Each allocation fails once: the sim is as it was, nothing leaks, and then the masses change. */
-START_TEST(masses_without_memory)
+TEST(masses_without_memory)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, ON_BALL, "");
+    scoped_host h = open_scene(ON_BALL, "");
     const int32_t node = 12;
     const double mass = 0.1;
     advance(&h, 4 * FRAME);
     const uint64_t hash = drape_sim_hash(h.sim);
     drape_status status = DRAPE_E_MEMORY;
     for (long n = 1; status; n++) {
-        memory.fail_at = memory.calls + n;
+        h.memory->fail_at = h.memory->calls + n;
         status = drape_sim_set_masses(h.sim, 1, &node, &mass);
-        memory.fail_at = 0;
+        h.memory->fail_at = 0;
         ck_assert(!status || status == DRAPE_E_MEMORY);
         ck_assert(drape_sim_hash(h.sim) == hash);
         ck_assert_int_eq(masses_of(&h)[node] == mass, status == DRAPE_OK);
         ck_assert_int_lt(n, 5000);
     }
     advance(&h, 2 * FRAME);
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("masses", masses_are_added_and_replaced, masses_from_structs, a_call_does_what_a_scene_does,
-      velocities_stay_and_momentum_follows, masses_without_memory)

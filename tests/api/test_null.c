@@ -24,8 +24,8 @@ static float vertices[3];
 static drape_hit hit;
 static drape_contact_point contact_point;
 static drape_check_result checked;
-static drape_place_def place_def;
-static drape_event_def event_def;
+static drape_place_def a_place;
+static drape_event_def an_event;
 
 static drape_status measure(void *user, double t, const double *positions, const double *velocities,
                             double *value)
@@ -73,7 +73,7 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     CALL(drape_sim_set_state(NULL, 0, x, x))                                                                 \
     CALL(drape_sim_set_state(sim, 0, NULL, x))                                                               \
     CALL(drape_sim_set_state(sim, 0, x, NULL))                                                               \
-    CALL(drape_sim_place(NULL, &place_def))                                                                  \
+    CALL(drape_sim_place(NULL, &a_place))                                                                    \
     CALL(drape_sim_place(sim, NULL))                                                                         \
     CALL(drape_sim_untangle(NULL, NULL, NULL))                                                               \
     CALL(drape_sim_change(NULL, scene))                                                                      \
@@ -133,9 +133,9 @@ static drape_status keep(void *user, const void *bytes, size_t size)
     CALL(drape_sim_collider_force(sim, 0, NULL))                                                             \
     CALL(drape_sim_collider_torque(NULL, 0, x, x))                                                           \
     CALL(drape_sim_collider_torque(sim, 0, NULL, NULL))                                                      \
-    CALL(drape_sim_add_event(NULL, &event_def, measure, NULL))                                               \
+    CALL(drape_sim_add_event(NULL, &an_event, measure, NULL))                                                \
     CALL(drape_sim_add_event(sim, NULL, measure, NULL))                                                      \
-    CALL(drape_sim_add_event(sim, &event_def, NULL, NULL))                                                   \
+    CALL(drape_sim_add_event(sim, &an_event, NULL, NULL))                                                    \
     CALL(drape_sim_save(NULL, "x.state"))                                                                    \
     CALL(drape_sim_save(sim, NULL))                                                                          \
     CALL(drape_sim_save_to(NULL, keep, NULL))                                                                \
@@ -273,18 +273,17 @@ static bool make_call(int which)
     return true;
 }
 
-START_TEST(null_arguments_do_no_harm)
+TEST(null_arguments_do_no_harm)
 {
-    failing_allocator memory = {.fail_at = 0};
-    host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "",
-                        "'colliders': [{'type': 'sphere', 'center': [0, -9, 0], 'radius': 0.1}],");
+    scoped_host h = open_scene(SHEET, "", "{'edge': 'top'}", "",
+                               "'colliders': [{'type': 'sphere', 'center': [0, -9, 0], 'radius': 0.1}],");
     char failed[4096] = "";
     ctx = h.ctx, model = h.model, sim = h.sim;
     ck_assert_int_eq(drape_scene_parse(ctx, "{}", "x.json", &scene), DRAPE_OK);
     ck_assert_int_eq(drape_embedding_create(ctx, model, 0, 1, vertices, NULL, &embedding), DRAPE_OK);
-    drape_place_def_init(&place_def, sizeof place_def);
-    drape_event_def_init(&event_def, sizeof event_def);
-    event_def.name = "event";
+    drape_place_def_init(&a_place, sizeof a_place);
+    drape_event_def_init(&an_event, sizeof an_event);
+    an_event.name = "event";
     memcpy(x, drape_sim_positions(sim), 3 * (size_t)drape_model_node_count(model) * sizeof *x);
     for (size_t i = 0; i < sizeof calls / sizeof *calls; i++) {
         int status = 0;
@@ -300,8 +299,4 @@ START_TEST(null_arguments_do_no_harm)
     ck_assert_msg(!*failed, "%s", failed);
     drape_embedding_destroy(&embedding);
     drape_scene_destroy(&scene);
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("null", null_arguments_do_no_harm)

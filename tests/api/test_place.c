@@ -8,18 +8,10 @@
 
 #define FRAME (1.0 / 64) /* [s], exact in binary */
 
-static drape_place_def place_def(void)
-{
-    drape_place_def def;
-    drape_place_def_init(&def, sizeof def);
-    return def;
-}
-
 /* The scene's sim under another integrator, with a teleport_speed. */
 static void use(host *h, const char *method, double teleport_speed)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.dt = FRAME / 2;
     def.teleport_speed = teleport_speed;
@@ -46,11 +38,11 @@ static double strain_of(const host *h)
     "[0, 1, 0]}], 'contact': {'stiffness': 2000}, "
 
 /* A sheet with a fixed pin, one on a track and one that the host moves, swept by a ball on a track. */
-static host swept(failing_allocator *memory, const char *method)
+static host swept(const char *method)
 {
-    host h = open_scene(memory, SHEET, "",
-                        "{'corner': 'top-left'}, {'corner': 'top-right', " TRACK "}, {'nodes': [2]}",
-                        "'tolerance': 1e-9, 'rtol': 1e-7", MOVING);
+    host h =
+        open_scene(SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right', " TRACK "}, {'nodes': [2]}",
+                   "'tolerance': 1e-9, 'rtol': 1e-7", MOVING);
     use(&h, method, 0);
     return h;
 }
@@ -97,11 +89,10 @@ static drape_place_def quarter_def(void)
  * of 1e-15 2e4/1e-4 N, which move a node of 2e-3 kg by 1e-9 m in a step of 3 ms; over some 100 steps it may
  * be 1e-7 m.
  */
-START_TEST(a_placed_sim_goes_on_as_before)
+TEST(a_placed_sim_goes_on_as_before)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory[2] = {{0}, {0}};
-        host here = swept(&memory[0], methods[i]), there = swept(&memory[1], methods[i]);
+        scoped_host here = swept(methods[i]), there = swept(methods[i]);
         const drape_place_def nowhere = place_def(), def = quarter_def();
         double worst = 0;
         for (int f = 1; f <= 16; f++) {
@@ -132,18 +123,14 @@ START_TEST(a_placed_sim_goes_on_as_before)
         const double most = adaptive ? 8 * sqrt(60) * 0.6 * 1e-7 : differences ? 1e-7 : 1e-8;
         ck_assert_msg(worst <= most, "%s: %g m apart", methods[i], worst);
         ck_assert_double_gt(fabs(drape_sim_positions(here.sim)[3 * 17 + 2]), 0.01); /* the ball met it */
-        close_scene(&here, &memory[0]);
-        close_scene(&there, &memory[1]);
     }
 }
-END_TEST
 
 /* Any rotation, about any axis: strain and elastic energy of cloth without colliders stay, velocities turn,
  * to rounding; placing it back by the opposite rotation restores it. */
-START_TEST(any_rotation_keeps_the_strain)
+TEST(any_rotation_keeps_the_strain)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}", "", "");
+    scoped_host h = open_scene(SHEET, "", "{'corner': 'top-left'}", "", "");
     double x[60], v[60];
     good(&h, drape_sim_advance(h.sim, 16 * FRAME));
     memcpy(x, drape_sim_positions(h.sim), sizeof x);
@@ -170,9 +157,7 @@ START_TEST(any_rotation_keeps_the_strain)
     for (int i = 0; i < 60; i++)
         ck_assert(drape_sim_velocities(h.sim)[i] == 0);
     ck_assert_double_eq_tol(drape_sim_energy(h.sim).numerical, numerical, 1e-12);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 #define SMALL(name)                                                                                          \
     "{'name': '" name                                                                                        \
@@ -180,24 +165,21 @@ END_TEST
     "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], "     \
     "'pins': [{'corner': 'top-left'}]}"
 
-static host several(failing_allocator *memory)
+static host several(void)
 {
-    return open_scene(
-        memory,
-        "{'drape': 1, 'cloth': [" SMALL("a") ", " SMALL(
-            "b") "], 'colliders': [{'type': 'box', "
-                 "'center': [9, 0, 0], 'size': [2, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
-                 "[0, -5, 0], 'radius': 1}, {'type': 'capsule', 'a': [5, 1, 0], 'b': [5, 2, 0], 'radius': "
-                 "0.1}, "
-                 "{'type': 'cylinder', 'a': [6, 1, 0], 'b': [6, 2, 0], 'radius': 0.1}], "
-                 "'integrator': {'method': 'be'}, 'duration': 1}");
+    return open_scene("{'drape': 1, 'cloth': [" SMALL("a") ", " SMALL(
+        "b") "], 'colliders': [{'type': 'box', "
+             "'center': [9, 0, 0], 'size': [2, 1, 1], 'name': 'crate'}, {'type': 'sphere', 'center': "
+             "[0, -5, 0], 'radius': 1}, {'type': 'capsule', 'a': [5, 1, 0], 'b': [5, 2, 0], 'radius': "
+             "0.1}, "
+             "{'type': 'cylinder', 'a': [6, 1, 0], 'b': [6, 2, 0], 'radius': 0.1}], "
+             "'integrator': {'method': 'be'}, 'duration': 1}");
 }
 
 /* Only what is chosen moves; the rest keeps its bits. */
-START_TEST(only_what_is_chosen_is_placed)
+TEST(only_what_is_chosen_is_placed)
 {
-    failing_allocator memory = {0};
-    host h = several(&memory);
+    scoped_host h = several();
     double x[54];
     const int32_t second = 1;
     drape_place_def def = place_def();
@@ -225,18 +207,15 @@ START_TEST(only_what_is_chosen_is_placed)
     good(&h, drape_sim_set_state(h.sim, 0, set, v));
     set[27] -= 0.5;
     ck_assert_int_eq(drape_sim_set_state(h.sim, 0, set, v), DRAPE_E_ARGUMENT);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* Contact becomes stiffer when forces are read where cloth was placed a fiftieth of the contact distance
  * from a ball. That is work of whoever placed it, and no energy is lost by the integrator: what is numerical
  * stays, to rounding of the sum of all parts. */
-START_TEST(forces_of_placed_cloth_keep_the_account)
+TEST(forces_of_placed_cloth_keep_the_account)
 {
-    failing_allocator memory = {0};
-    host h =
-        open_scene(&memory, SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}", "'dt': 0.0078125",
+    scoped_host h =
+        open_scene(SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}", "'dt': 0.0078125",
                    "'colliders': [{'type': 'sphere', 'center': [0.25, -0.2, -1], 'radius': 0.1}], ");
     drape_place_def def = place_def();
     double force[3 * 20];
@@ -250,15 +229,12 @@ START_TEST(forces_of_placed_cloth_keep_the_account)
     ck_assert_double_gt(e.contact, 0);
     ck_assert_double_eq_tol(e.numerical, numerical,
                             1e-14 * (e.contact + e.elastic + fabs(e.gravity) + e.kinetic));
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A checkpoint has the placements: the restored sim continues with the same bits. */
-START_TEST(a_checkpoint_keeps_placements)
+TEST(a_checkpoint_keeps_placements)
 {
-    failing_allocator memory[2] = {{0}, {0}};
-    host h = swept(&memory[0], "be"), other = swept(&memory[1], "be");
+    scoped_host h = swept("be"), other = swept("be");
     const drape_place_def def = quarter_def();
     good(&h, drape_sim_advance(h.sim, 4 * FRAME));
     good(&h, drape_sim_place(h.sim, &def));
@@ -269,10 +245,7 @@ START_TEST(a_checkpoint_keeps_placements)
     good(&h, drape_sim_advance(h.sim, 12 * FRAME));
     good(&other, drape_sim_advance(other.sim, 12 * FRAME));
     ck_assert_uint_eq(drape_sim_hash(h.sim), drape_sim_hash(other.sim));
-    close_scene(&h, &memory[0]);
-    close_scene(&other, &memory[1]);
 }
-END_TEST
 
 /* ---- Pins that are sent too fast ---- */
 
@@ -318,10 +291,9 @@ static void walk(host *h, double *strain)
 
 /* Frames 65 to 67 have the strain of frame 64: the cloth hangs at its pins as before. Without teleport_speed
  * it is strained by more than a fifth. */
-START_TEST(pins_that_are_sent_far_take_their_cloth_along)
+TEST(pins_that_are_sent_far_take_their_cloth_along)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, CAPE);
+    scoped_host h = open_scene(CAPE);
     double strain[4];
     use(&h, NULL, 20);
     walk(&h, strain);
@@ -332,19 +304,17 @@ START_TEST(pins_that_are_sent_far_take_their_cloth_along)
     walk(&h, strain);
     printf("# without: strain %.4f, then %.4f, %.4f, %.4f\n", strain[0], strain[1], strain[2], strain[3]);
     ck_assert_double_gt(strain[3], 0.2);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A body under the cape, sent as far in the same frame, is there at once; both keep their contact, whichever
  * is sent first. */
-START_TEST(colliders_that_are_sent_far_are_there)
+TEST(colliders_that_are_sent_far_are_there)
 {
     for (int first = 0; first < 2; first++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "'method': 'be', 'dt': 0.0078125",
-                            "'colliders': [{'type': 'sphere', 'center': [0.25, -0.3, 0.09], 'radius': 0.1, "
-                            "'friction': 0.3}], 'contact': {'stiffness': 2000, 'distance': 4e-3}, ");
+        scoped_host h =
+            open_scene(SHEET, "", "{'edge': 'top'}", "'method': 'be', 'dt': 0.0078125",
+                       "'colliders': [{'type': 'sphere', 'center': [0.25, -0.3, 0.09], 'radius': 0.1, "
+                       "'friction': 0.3}], 'contact': {'stiffness': 2000, 'distance': 4e-3}, ");
         const double to[3] = {0, 0, 3}, speed[3] = {0, 0, 1};
         int32_t nodes[5];
         double pins[15], v[15];
@@ -367,16 +337,13 @@ START_TEST(colliders_that_are_sent_far_are_there)
         ck_assert_double_eq_tol(drape_sim_collider(h.sim, 0).displacement[2], 3, 1e-12);
         ck_assert_double_le(strain_of(&h), strain + 0.05);
         ck_assert_int_eq(drape_sim_inside(h.sim, 0, NULL), 0);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* One pin, and pins on a line, leave rotations free: none is made about the pin, or about the line. */
-START_TEST(a_free_rotation_is_not_made)
+TEST(a_free_rotation_is_not_made)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}", "", "");
+    scoped_host h = open_scene(SHEET, "", "{'corner': 'top-left'}", "", "");
     const int32_t node = 0;
     double x[60], to[3];
     use(&h, NULL, 20);
@@ -387,9 +354,9 @@ START_TEST(a_free_rotation_is_not_made)
     good(&h, drape_sim_move_pins(h.sim, 1, &node, FRAME, to, NULL));
     for (int i = 0; i < 60; i++)
         ck_assert_double_eq_tol(drape_sim_positions(h.sim)[i], x[i] + 4, 20 * DBL_EPSILON);
-    close_scene(&h, &memory);
+    close_scene(&h);
 
-    h = open_scene(&memory, CAPE);
+    h = open_scene(CAPE);
     use(&h, NULL, 20);
     int32_t nodes[PINS];
     double row[3 * PINS], most = 0;
@@ -403,9 +370,7 @@ START_TEST(a_free_rotation_is_not_made)
                     fabs(drape_sim_positions(h.sim)[i] - drape_model_rest_positions(h.model)[i] - by[i % 3]));
     ck_assert_double_le(most,
                         1e-9); /* rounding of the products, 1e-16, over the share 1e-6 against rotations */
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
@@ -441,11 +406,10 @@ static void send_wrongly(host *h)
 
 /* After a step, whose beginning is kept for the frames within it, all that a checkpoint contains is the same
  * byte for byte. */
-START_TEST(what_is_sent_wrongly_changes_nothing)
+TEST(what_is_sent_wrongly_changes_nothing)
 {
     for (int i = 0; i < METHODS; i++) {
-        failing_allocator memory = {0};
-        host h = several(&memory);
+        scoped_host h = several();
         const int32_t node = 0;
         const double at[3] = {0.01, 0, 0};
         use(&h, methods[i], 20);
@@ -453,19 +417,10 @@ START_TEST(what_is_sent_wrongly_changes_nothing)
         for (int32_t c = 0; c < 4; c++)
             good(&h, drape_sim_move_collider(h.sim, c, 1, at, NULL));
         good(&h, drape_sim_advance(h.sim, 3.3 * FRAME));
-        bytes before = bytes_save(h.sim);
+        scoped_bytes before = bytes_save(h.sim);
         send_wrongly(&h);
-        bytes after = bytes_save(h.sim);
+        scoped_bytes after = bytes_save(h.sim);
         ck_assert_uint_eq(before.size, after.size);
         ck_assert_msg(memcmp(before.data, after.data, before.size) == 0, "%s", methods[i]);
-        free(before.data);
-        free(after.data);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
-
-SUITE("place", a_placed_sim_goes_on_as_before, any_rotation_keeps_the_strain, only_what_is_chosen_is_placed,
-      forces_of_placed_cloth_keep_the_account, a_checkpoint_keeps_placements,
-      pins_that_are_sent_far_take_their_cloth_along, colliders_that_are_sent_far_are_there,
-      a_free_rotation_is_not_made, what_is_sent_wrongly_changes_nothing)

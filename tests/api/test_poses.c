@@ -17,11 +17,11 @@ typedef struct turned {
     drape_scene *scene;
 } turned;
 
-static turned open_turned(failing_allocator *memory, const char *motion, double teleport_speed)
+static turned open_turned(const char *motion, double teleport_speed)
 {
     char text[1024];
-    turned t = {.h = {.ctx = failing_context(memory)}};
-    drape_sim_def def;
+    turned t = {.h = empty_host()};
+    drape_sim_def def = sim_def();
     snprintf(
         text, sizeof text,
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, "
@@ -29,9 +29,7 @@ static turned open_turned(failing_allocator *memory, const char *motion, double 
         "'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], 'pins': [{'edge': 'top'}]}], " BOX
         "'integrator': {'method': 'be', 'dt': 0.0078125}, 'duration': 10}",
         motion);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
-    drape_sim_def_init(&def, sizeof def);
+    quote(text);
     def.teleport_speed = teleport_speed;
     good(&t.h, drape_scene_parse(t.h.ctx, text, "s.json", &t.scene));
     good(&t.h, drape_scene_compile(t.scene, &t.h.model));
@@ -39,11 +37,13 @@ static turned open_turned(failing_allocator *memory, const char *motion, double 
     return t;
 }
 
-static void close_turned(turned *t, failing_allocator *memory)
+static void close_turned(turned *t)
 {
     drape_scene_destroy(&t->scene);
-    close_scene(&t->h, memory);
+    close_scene(&t->h);
 }
+
+#define scoped_turned SCOPED(close_turned) turned
 
 static void advance(const turned *t, double seconds)
 {
@@ -90,17 +90,15 @@ static void change_pivot(const turned *t, const char *value)
 
 /* On a track of its own, placed elsewhere or not, a body stays where it is and goes on turning about the new
  * pivot, which then rests. 100 roundings of lengths and speeds of about 1. */
-START_TEST(a_turning_body_stays_where_it_is)
+TEST(a_turning_body_stays_where_it_is)
 {
     for (int placed = 0; placed < 2; placed++) {
-        failing_allocator memory = {0};
-        turned t = open_turned(&memory,
-                               ", 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 4, 'rotate': "
-                               "[0, 0, 1, 720]}]",
-                               0);
+        scoped_turned t =
+            open_turned(", 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 4, 'rotate': "
+                        "[0, 0, 1, 720]}]",
+                        0);
         double before[3], after[3], v[3], pivot[2][3];
-        drape_place_def place;
-        drape_place_def_init(&place, sizeof place);
+        drape_place_def place = place_def();
         place.rotate[1] = 1, place.rotate[3] = 50;
         place.translate[2] = 0.7;
         advance(&t, 24 * FRAME);
@@ -116,20 +114,17 @@ START_TEST(a_turning_body_stays_where_it_is)
         same(pivot[1], pivot[0], 100 * DBL_EPSILON);
         corner_of(&t, second, after, v);
         ck_assert_double_gt(distance(before, after), 0.1);
-        close_turned(&t, &memory);
     }
 }
-END_TEST
 
 /* A body on its path to a pose that a host has sent has the same pose and the same velocities at the moment
  * of the change, and the pose that was sent at its end; also if the change comes at the end, or after it.
  * */
-START_TEST(a_sent_body_arrives_where_it_was_sent)
+TEST(a_sent_body_arrives_where_it_was_sent)
 {
     for (int frames = 1; frames <= 5; frames += 2)
         for (int smooth = 0; smooth < 2; smooth++) {
-            failing_allocator memory = {0}, other = {0};
-            turned t = open_turned(&memory, "", 0), plain = open_turned(&other, "", 0);
+            scoped_turned t = open_turned("", 0), plain = open_turned("", 0);
             const double to[3] = {0.3, 0.1, -0.2}, q[4] = {0.8, 0, 0.6, 0}, v[3] = {0.5, 1, 0},
                          w[3] = {0.1, 2, -0.3}, next[4] = {0.6, 0, 0.8, 0};
             double x[2][3], u[2][3];
@@ -157,21 +152,16 @@ START_TEST(a_sent_body_arrives_where_it_was_sent)
             advance(&t, FRAME);
             const drape_collider_motion at = drape_sim_collider(t.h.sim, 0);
             same(at.displacement, to, 100 * DBL_EPSILON);
-            close_turned(&t, &memory);
-            close_turned(&plain, &other);
         }
 }
-END_TEST
 
 /* The pivot that no scene gives is the middle of the shape: a box that is put elsewhere in the scene turns
  * about its middle there. */
-START_TEST(a_middle_moves_with_its_shape)
+TEST(a_middle_moves_with_its_shape)
 {
-    failing_allocator memory = {0};
-    turned t = open_turned(&memory,
-                           ", 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 4, 'rotate': "
-                           "[0, 0, 1, 720]}]",
-                           0);
+    scoped_turned t = open_turned(", 'turns': [{'time': 0, 'rotate': [0, 0, 1, 0]}, {'time': 4, 'rotate': "
+                                  "[0, 0, 1, 720]}]",
+                                  0);
     double pivot[3];
     const double there[3] = {1, 2, 3};
     good(&t.h, drape_scene_set(t.scene, "/colliders/0/pivot", NULL));
@@ -181,18 +171,15 @@ START_TEST(a_middle_moves_with_its_shape)
     good(&t.h, drape_sim_change(t.h.sim, t.scene));
     drape_sim_collider_rotation(t.h.sim, 0, NULL, NULL, pivot);
     same(pivot, there, 100 * DBL_EPSILON);
-    close_turned(&t, &memory);
 }
-END_TEST
 
 /* ---- Spins ---- */
 
 /* Half a turn in a microsecond would be 3.1e6 rad/s: it is refused, with one line, and nothing changes; in
  * 1 ms it is allowed. */
-START_TEST(a_turn_within_a_moment_is_refused)
+TEST(a_turn_within_a_moment_is_refused)
 {
-    failing_allocator memory = {0};
-    turned t = open_turned(&memory, "", 0);
+    scoped_turned t = open_turned("", 0);
     const double here[3] = {0}, still[3] = {0}, q[4] = {0, 0, 1, 0};
     const uint64_t hash = drape_sim_hash(t.h.sim);
     for (int i = 0; i < 2; i++)
@@ -204,18 +191,15 @@ START_TEST(a_turn_within_a_moment_is_refused)
     ck_assert(drape_sim_hash(t.h.sim) == hash);
     good(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, 1e-3, here, q, NULL, NULL));
     advance(&t, FRAME);
-    close_turned(&t, &memory);
 }
-END_TEST
 
 /* With a teleport_speed of 5 m/s a body that would have to turn by 2 rad in 1/64 s is there at once, less
  * the turn at its velocity on arrival, whether that is given or is the one that it had. Its corners are .37
  * m from the pivot at most: a turn of .1 rad, at 2.4 m/s, is made. */
-START_TEST(what_turns_too_fast_is_placed)
+TEST(what_turns_too_fast_is_placed)
 {
     for (int given = 0; given < 2; given++) {
-        failing_allocator memory = {0};
-        turned t = open_turned(&memory, "", 5);
+        scoped_turned t = open_turned("", 5);
         const double here[3] = {0}, w[3] = {0, 3, 0};
         double q[4] = {cos(0.05), 0, sin(0.05), 0}, got[4];
         good(&t.h, drape_sim_move_collider_pose(t.h.sim, 0, FRAME, here, q, here, w));
@@ -230,10 +214,5 @@ START_TEST(what_turns_too_fast_is_placed)
         advance(&t, FRAME);
         drape_sim_collider_rotation(t.h.sim, 0, got, NULL, NULL);
         ck_assert_double_eq_tol(2 * atan2(got[2], got[0]), 2, 1e-14);
-        close_turned(&t, &memory);
     }
 }
-END_TEST
-
-SUITE("poses", a_turning_body_stays_where_it_is, a_sent_body_arrives_where_it_was_sent,
-      a_middle_moves_with_its_shape, a_turn_within_a_moment_is_refused, what_turns_too_fast_is_placed)

@@ -9,10 +9,9 @@
 #define PAD "'integrator': {'tolerance': 1e-9}, 'frame_rate': 64, 'duration': 1}"
 
 /* A sheet that falls on a ball and a box, after 0.4 s. */
-static host draped(failing_allocator *memory, const char *contact)
+static host draped(const char *contact)
 {
     host h = open_scene(
-        memory,
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.5, 'height': "
         "0.5},"
         "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', "
@@ -144,10 +143,9 @@ static void check_place(const host *h, const drape_hit *hit, const double *from)
 
 enum { COUNT = 400 };
 
-START_TEST(nearest_places)
+TEST(nearest_places)
 {
-    failing_allocator memory = {0};
-    host h = draped(&memory, "");
+    scoped_host h = draped("");
     static double points[3 * COUNT];
     static drape_hit hits[COUNT];
     for (int i = 0; i < 3 * COUNT; i++)
@@ -181,14 +179,11 @@ START_TEST(nearest_places)
     good(&h, drape_sim_closest(h.sim, 2, COUNT, points, INFINITY, hits));
     for (int i = 0; i < COUNT; i++)
         ck_assert_double_eq(fabs(both[i].distance), fmin(cloth[i].distance, fabs(hits[i].distance)));
-    close_scene(&h, &memory);
 }
-END_TEST
 
-START_TEST(rays)
+TEST(rays)
 {
-    failing_allocator memory = {0};
-    host h = draped(&memory, "");
+    scoped_host h = draped("");
     static double origins[3 * COUNT], directions[3 * COUNT];
     static drape_hit hits[COUNT];
     for (int i = 0; i < 3 * COUNT; i++) {
@@ -241,16 +236,13 @@ START_TEST(rays)
             ck_assert(hits[i].found && hits[i].distance == 0);
     }
     ck_assert(balls > 5 && floors > 5);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* The length of a direction does not matter, whatever its square is; one that has none is refused. */
-START_TEST(rays_of_any_length)
+TEST(rays_of_any_length)
 {
     static const double sizes[] = {1, 1e200, 1e-200, 1e308, 1e-308};
-    failing_allocator memory = {0};
-    host h = draped(&memory, "");
+    scoped_host h = draped("");
     const double origin[3] = {0.26, 0.5, -0.24};
     double directions[15];
     drape_hit hits[5];
@@ -268,16 +260,13 @@ START_TEST(rays_of_any_length)
     for (int i = 0; i < 3; i++)
         says(&h, drape_sim_cast(h.sim, DRAPE_QUERY_CLOTH, 1, origin, wrong[i], 5, hits), DRAPE_E_ARGUMENT,
              "directions and length must be finite, and no direction 0");
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Contacts ---- */
 
 static void check_contacts(const char *contact, bool by_nodes)
 {
-    failing_allocator memory = {0};
-    host h = draped(&memory, contact);
+    scoped_host h = draped(contact);
     static drape_contact_point list[2000];
     double by_collider[3][3] = {{0}}, total[243] = {0}, forces[243], on[3], size = 0;
     int32_t count = 0, again = 0;
@@ -320,24 +309,21 @@ static void check_contacts(const char *contact, bool by_nodes)
     says(&h, drape_sim_contacts(h.sim, 1, NULL, &count), DRAPE_E_ARGUMENT, "room for 1");
     says(&h, drape_sim_contacts(h.sim, 0, NULL, NULL), DRAPE_E_ARGUMENT, "no count");
     ck_assert_int_eq(drape_sim_contacts(NULL, 0, NULL, &count), DRAPE_E_ARGUMENT);
-    close_scene(&h, &memory);
 }
 
-START_TEST(contacts_have_the_forces)
+TEST(contacts_have_the_forces)
 {
     check_contacts("", false);
     check_contacts("'contact': {'friction': 'lagged'}, ", false);
 }
-END_TEST
 
 /* ---- A mesh that the cloth carries ---- */
 
 /* At rest vertices are where they were given, to the rounding of float. Under a rigid motion they move with
  * it, and so do normals; in an affine one vertices in the sheet do. */
-START_TEST(a_mesh_is_carried)
+TEST(a_mesh_is_carried)
 {
-    failing_allocator memory = {0};
-    host h = draped(&memory, "");
+    scoped_host h = draped("");
     enum { VERTICES = 200 };
     static float vertices[3 * VERTICES], normals[3 * VERTICES], at[3 * VERTICES], turned[3 * VERTICES];
     static double x[243];
@@ -391,33 +377,25 @@ START_TEST(a_mesh_is_carried)
          "cloth 1");
     says(&h, drape_embedding_create(h.ctx, NULL, 0, 1, vertices, NULL, &mesh), DRAPE_E_ARGUMENT, "no model");
     for (long n = 1; n < 8; n++) {
-        memory.fail_at = memory.calls + n;
+        h.memory->fail_at = h.memory->calls + n;
         const drape_status status = drape_embedding_create(h.ctx, h.model, 0, 1, vertices, NULL, &mesh);
         ck_assert(status == DRAPE_E_MEMORY ? mesh == NULL : status == DRAPE_OK);
-        memory.fail_at = 0;
+        h.memory->fail_at = 0;
         drape_embedding_destroy(&mesh);
     }
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
 /* Without memory for its tree a query fails, and the next one is as if nothing had been. */
-START_TEST(a_query_without_memory)
+TEST(a_query_without_memory)
 {
-    failing_allocator memory = {0};
-    host h = draped(&memory, "");
+    scoped_host h = draped("");
     const double point[3] = {0, 0, 0};
     drape_hit hit;
-    memory.fail_at = memory.calls + 1;
+    h.memory->fail_at = h.memory->calls + 1;
     ck_assert_int_eq(drape_sim_closest(h.sim, 1, 1, point, 1, &hit), DRAPE_E_MEMORY);
-    memory.fail_at = 0;
+    h.memory->fail_at = 0;
     good(&h, drape_sim_closest(h.sim, 1, 1, point, 10, &hit));
     ck_assert(hit.found);
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("query", nearest_places, rays, rays_of_any_length, contacts_have_the_forces, a_mesh_is_carried,
-      a_query_without_memory)

@@ -16,10 +16,9 @@ static const char tangled[] = "{'drape': 1, 'cloth': [" CLOTH("a", "0, 1, 0, 0",
 #define PINNED ", 'pins': [{'box': [[-1, -1, -1], [1, 1, 1]]}]"
 
 /* A scene that does not ask for it stays as it is until the host does, who learns what was done. */
-START_TEST(a_host_untangles)
+TEST(a_host_untangles)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, "", "", "");
+    scoped_host h = open_scene(tangled, "", "", "");
     drape_untangling u = {.sweeps = -1}, last;
     double moved[2], before[98 * 3];
     good(&h, drape_sim_advance(h.sim, 1.0 / 64));
@@ -50,16 +49,13 @@ START_TEST(a_host_untangles)
     const uint64_t hash = drape_sim_hash(h.sim);
     good(&h, drape_sim_untangle(h.sim, NULL, &u));
     ck_assert(u.clear && u.node == -1 && u.cloths == 0 && u.sweeps == 0 && drape_sim_hash(h.sim) == hash);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A scene is untangled before its first step and its first frame; by a budget as well. */
-START_TEST(a_scene_untangles_before_its_first_step)
+TEST(a_scene_untangles_before_its_first_step)
 {
     for (int k = 0; k < 2; k++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, tangled, "", "", "'untangle': {},");
+        scoped_host h = open_scene(tangled, "", "", "'untangle': {},");
         drape_untangling u;
         ck_assert(!drape_sim_untangling(h.sim, &u, NULL));
         good(&h,
@@ -68,16 +64,13 @@ START_TEST(a_scene_untangles_before_its_first_step)
         good(&h, drape_sim_advance(h.sim, 0.125));
         ck_assert_int_eq(drape_sim_intersections(h.sim, -1), 0);
         ck_assert(drape_sim_untangling(h.sim, &u, NULL) && u.time == 0); /* once */
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 /* Sheets that cannot move stay entangled, and that is no success. */
-START_TEST(what_stays_entangled_is_reported)
+TEST(what_stays_entangled_is_reported)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, PINNED, PINNED, "");
+    scoped_host h = open_scene(tangled, PINNED, PINNED, "");
     const uint64_t hash = drape_sim_hash(h.sim);
     drape_untangle_def def;
     drape_untangling u;
@@ -93,18 +86,15 @@ START_TEST(what_stays_entangled_is_reported)
     for (int i = 0; drape_sim_warning(h.sim, i, &w); i++)
         warned = warned || strcmp(w.name, "tangled") == 0;
     ck_assert(warned);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* Where the sweeps are too few, the sim has what they reached with `keep`, else it is as before. */
-START_TEST(what_was_reached_is_kept_if_wanted)
+TEST(what_was_reached_is_kept_if_wanted)
 {
     int64_t least = INT64_MAX, most = 0; /* of the pairs that remained when it did not come apart */
     drape_status status = DRAPE_E_SOLVER;
     for (int sweeps = 1; status; sweeps++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, tangled, "", "", "");
+        scoped_host h = open_scene(tangled, "", "", "");
         const uint64_t hash = drape_sim_hash(h.sim);
         drape_untangle_def def;
         drape_untangling u;
@@ -121,21 +111,17 @@ START_TEST(what_was_reached_is_kept_if_wanted)
             least = u.pairs < least ? u.pairs : least;
             most = u.pairs > most ? u.pairs : most;
         }
-        close_scene(&h, &memory);
     }
     ck_assert(least < most); /* some reached a part */
 }
-END_TEST
 
 /* A sheet in a body that pins in its middle, or at each corner, hold there: what is kept is in no count worse
  * than the start, and still cloth. */
-START_TEST(what_is_kept_is_never_worse)
+TEST(what_is_kept_is_never_worse)
 {
     for (int shape = 0; shape < 2; shape++)
         for (size_t k = 0; k < 2; k++) {
-            failing_allocator memory = {0};
-            host h = open_scene(
-                &memory,
+            scoped_host h = open_scene(
                 "{'drape': 1, 'cloth': [" CLOTH(
                     "a", "0, 1, 0, 0", "-0.3, 0, 0.3") "], 'self_contact': {'thickness': 0.003}, "
                                                        "'colliders': [%s], 'integrator': "
@@ -157,44 +143,36 @@ START_TEST(what_is_kept_is_never_worse)
             const drape_energy e = drape_sim_energy(h.sim);
             ck_assert(isfinite(e.elastic) && isfinite(e.contact));
             good(&h, drape_sim_advance(h.sim, 0.01));
-            close_scene(&h, &memory);
         }
 }
-END_TEST
 
 /* on_failure of a scene: its run ends before the first step, again and again, or goes on with a warning. */
-START_TEST(a_scene_says_what_happens_on_failure)
+TEST(a_scene_says_what_happens_on_failure)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {},");
+    scoped_host h = open_scene(tangled, PINNED, PINNED, "'untangle': {},");
     for (int k = 0; k < 2; k++) {
         says(&h, drape_sim_advance(h.sim, 0.125), DRAPE_E_SOLVER, "did not come apart");
         ck_assert_double_eq(drape_sim_time(h.sim), 0);
     }
-    close_scene(&h, &memory);
-    h = open_scene(&memory, tangled, PINNED, PINNED, "'untangle': {'on_failure': 'continue'},");
+    close_scene(&h);
+    h = open_scene(tangled, PINNED, PINNED, "'untangle': {'on_failure': 'continue'},");
     drape_warning w;
     bool warned = false;
     good(&h, drape_sim_advance(h.sim, 0.125));
     for (int i = 0; drape_sim_warning(h.sim, i, &w); i++)
         warned = warned || strcmp(w.name, "tangled") == 0;
     ck_assert(warned);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* What the scene lets pass is not taken apart. */
-START_TEST(what_is_ignored_stays)
+TEST(what_is_ignored_stays)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, ", 'ignore': ['b']", "", "");
+    scoped_host h = open_scene(tangled, ", 'ignore': ['b']", "", "");
     const uint64_t hash = drape_sim_hash(h.sim);
     drape_untangling u;
     good(&h, drape_sim_untangle(h.sim, NULL, &u));
     ck_assert(u.clear && u.pairs_before == 0 && u.node == -1 && drape_sim_hash(h.sim) == hash);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 static drape_status untangle_within(void *user, const drape_event *event)
 {
@@ -202,10 +180,9 @@ static drape_status untangle_within(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-START_TEST(wrong_calls_are_refused)
+TEST(wrong_calls_are_refused)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, tangled, "", "", "");
+    scoped_host h = open_scene(tangled, "", "", "");
     const uint64_t hash = drape_sim_hash(h.sim);
     drape_untangle_def def = {.struct_size = 3};
     drape_status within = DRAPE_OK;
@@ -225,24 +202,21 @@ START_TEST(wrong_calls_are_refused)
     good(&h, drape_sim_observe(h.sim, untangle_within, &within));
     good(&h, drape_sim_advance(h.sim, 1.0 / 64));
     ck_assert_int_eq(within, DRAPE_E_ARGUMENT);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* A run that is saved before and after its start was untangled goes on with the same bits. */
-START_TEST(checkpoints_know_it)
+TEST(checkpoints_know_it)
 {
-    failing_allocator memory = {0}, other = {0};
-    host h = open_scene(&memory, tangled, "", "", "'untangle': {},");
-    bytes before = bytes_save(h.sim);
+    scoped_host h = open_scene(tangled, "", "", "'untangle': {},");
+    scoped_bytes before = bytes_save(h.sim);
     good(&h, drape_sim_advance(h.sim, 0.0625));
-    bytes after = bytes_save(h.sim);
+    scoped_bytes after = bytes_save(h.sim);
     drape_untangling u, saved;
     ck_assert(drape_sim_untangling(h.sim, &saved, NULL));
     good(&h, drape_sim_advance(h.sim, 0.125));
     const bytes *const from[] = {&before, &after};
     for (int k = 0; k < 2; k++) {
-        host r = open_scene(&other, tangled, "", "", "'untangle': {},");
+        scoped_host r = open_scene(tangled, "", "", "'untangle': {},");
         good(&r, drape_sim_restore_from(r.sim, from[k]->data, from[k]->size));
         ck_assert(drape_sim_untangling(r.sim, &u, NULL) == (k == 1));
         good(&r, drape_sim_advance(r.sim, 0.0625));
@@ -250,14 +224,5 @@ START_TEST(checkpoints_know_it)
         ck_assert(drape_sim_untangling(r.sim, &u, NULL) && u.pairs_before == saved.pairs_before);
         ck_assert_double_eq(u.displacement, saved.displacement);
         ck_assert_uint_eq(drape_sim_hash(r.sim), drape_sim_hash(h.sim));
-        close_scene(&r, &other);
     }
-    free(before.data);
-    free(after.data);
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("untangle", a_host_untangles, a_scene_untangles_before_its_first_step, what_stays_entangled_is_reported,
-      what_was_reached_is_kept_if_wanted, what_is_kept_is_never_worse, a_scene_says_what_happens_on_failure,
-      what_is_ignored_stays, wrong_calls_are_refused, checkpoints_know_it)

@@ -11,7 +11,7 @@
 
 /* A sheet on a ball, which is collider 0; collider 1 is a mesh that deforms, and is far below. Node 0 is
  * pinned, node 7 is free; there are 20. */
-static host open_sheet(failing_allocator *memory, const char *method)
+static host open_sheet(const char *method)
 {
     char rest[1024];
     const char *source = getenv("DRAPE_SOURCE");
@@ -23,7 +23,7 @@ static host open_sheet(failing_allocator *memory, const char *method)
              source);
     char integrator[100];
     snprintf(integrator, sizeof integrator, "'method': '%s'", method);
-    host h = open_scene(memory, SHEET, "", "{'edge': 'top'}", integrator, rest);
+    host h = open_scene(SHEET, "", "{'edge': 'top'}", integrator, rest);
     good(&h, drape_sim_advance(h.sim, 2 * FRAME));
     return h;
 }
@@ -40,8 +40,7 @@ static int32_t counted;
 
 static drape_status place_with(drape_sim *sim, void (*edit)(drape_place_def *))
 {
-    drape_place_def def;
-    drape_place_def_init(&def, sizeof def);
+    drape_place_def def = place_def();
     edit(&def);
     return drape_sim_place(sim, &def);
 }
@@ -234,10 +233,9 @@ static void expect_as_before(const host *h, const bytes *before, const char *wha
     free(after.data);
 }
 
-START_TEST(wrong_calls_change_nothing)
+TEST(wrong_calls_change_nothing)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be");
+    scoped_host h = open_sheet("be");
     const bytes before = bytes_save(h.sim);
     for (int i = 0; i < WRONGS; i++) {
         drape_context_set_message(h.ctx, "%s", "");
@@ -256,15 +254,12 @@ START_TEST(wrong_calls_change_nothing)
     expect_as_before(&h, &before, "a save that fails");
     free(before.data);
     good(&h, drape_sim_advance(h.sim, 4 * FRAME));
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* Empty lists are no mistake. */
-START_TEST(nothing_is_done_for_nothing)
+TEST(nothing_is_done_for_nothing)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be");
+    scoped_host h = open_sheet("be");
     const uint64_t hash = drape_sim_hash(h.sim);
     good(&h, drape_sim_attach(h.sim, 0, 0, NULL, NULL));
     good(&h, drape_sim_detach(h.sim, 0, NULL));
@@ -273,28 +268,22 @@ START_TEST(nothing_is_done_for_nothing)
     good(&h, drape_sim_closest(h.sim, 3, 0, NULL, 1, NULL));
     good(&h, drape_sim_place(h.sim, &(drape_place_def){.struct_size = sizeof(drape_place_def)}));
     ck_assert_uint_eq(drape_sim_hash(h.sim), hash);
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* The method moves nodes out of contact, so that there are no forces. */
-START_TEST(verlet_has_no_contact_forces)
+TEST(verlet_has_no_contact_forces)
 {
-    failing_allocator memory = {0};
-    host h = open_scene(&memory, SHEET, "", "", "'method': 'verlet'",
-                        "'colliders': [{'type': 'sphere', 'center': [0, -9, 0], 'radius': 0.1}],");
+    scoped_host h = open_scene(SHEET, "", "", "'method': 'verlet'",
+                               "'colliders': [{'type': 'sphere', 'center': [0, -9, 0], 'radius': 0.1}],");
     says(&h, drape_sim_contact_forces(h.sim, forces), DRAPE_E_ARGUMENT, "resolves contact by moving nodes");
     says(&h, drape_sim_collider_force(h.sim, 0, forces), DRAPE_E_ARGUMENT, "no contact force");
-    close_scene(&h, &memory);
 }
-END_TEST
 
 /* ---- Observers ---- */
 
 static drape_status right_place(drape_sim *sim)
 {
-    drape_place_def def;
-    drape_place_def_init(&def, sizeof def);
+    drape_place_def def = place_def();
     return drape_sim_place(sim, &def);
 }
 
@@ -353,25 +342,20 @@ static drape_status watch(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-START_TEST(observers_read_and_change_nothing)
+TEST(observers_read_and_change_nothing)
 {
-    failing_allocator memory = {0}, other = {0};
-    host h = open_sheet(&memory, "be"), alone = open_sheet(&other, "be");
+    scoped_host h = open_sheet("be"), alone = open_sheet("be");
     good(&h, drape_sim_observe(h.sim, watch, &h));
     good(&h, drape_sim_advance(h.sim, 8 * FRAME));
     good(&alone, drape_sim_advance(alone.sim, 8 * FRAME));
     ck_assert(drape_sim_hash(h.sim) == drape_sim_hash(alone.sim));
-    close_scene(&h, &memory);
-    close_scene(&alone, &other);
 }
-END_TEST
 
 /* ---- Embeddings ---- */
 
-START_TEST(wrong_embeddings)
+TEST(wrong_embeddings)
 {
-    failing_allocator memory = {0};
-    host h = open_sheet(&memory, "be");
+    scoped_host h = open_sheet("be");
     const float vertex[3] = {0, 0, 0}, bad[3] = {NAN, 0, 0};
     drape_embedding *mesh = NULL;
     const drape_status e = DRAPE_E_ARGUMENT;
@@ -385,9 +369,4 @@ START_TEST(wrong_embeddings)
     says(&h, drape_embedding_create(h.ctx, h.model, 0, 1, vertex, NULL, NULL), e, "drape_embedding_create:");
     ck_assert_ptr_null(mesh);
     ck_assert_int_eq(drape_embedding_create(NULL, h.model, 0, 1, vertex, NULL, &mesh), e);
-    close_scene(&h, &memory);
 }
-END_TEST
-
-SUITE("verbs", wrong_calls_change_nothing, nothing_is_done_for_nothing, verlet_has_no_contact_forces,
-      observers_read_and_change_nothing, wrong_embeddings)

@@ -344,10 +344,8 @@ static drape_status make_model(scene *s, const extreme *c, const sheet *mesh)
                                       {"density", 200, NULL}};
     const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}, {"bend.hinge", NULL, 0}};
     drape_pin_def pins[MAX_PINS];
-    drape_cloth_def cloth;
-    drape_scene_def def;
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_scene_def_init(&def, sizeof def);
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     for (size_t i = 0; i < mesh->pins; i++) {
         drape_pin_def_init(&pins[i], sizeof pins[i]);
         pins[i].nodes = mesh->pin[i].node;
@@ -454,14 +452,13 @@ static const char *complaint(const extreme *c, const outcome *o, drape_status st
 static bool run(const extreme *c, const char *method, unsigned bit)
 {
     static sheet mesh;
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     const drape_setting settings[] = {{"dt", or_else(c->dt, 1.0 / 60), NULL}};
-    drape_sim_def def;
+    drape_sim_def def = sim_def();
     outcome o = {.scene = &s, .bounded = !(bit & CONTROLLED), .duration = duration_of(c, bit)};
     memset(&mesh, 0, sizeof mesh);
     c->mesh ? c->mesh(&mesh) : hung(&mesh);
     ck_assert_msg(make_model(&s, c, &mesh) == DRAPE_OK, "%s: %s", c->name, drape_context_message(s.ctx));
-    drape_sim_def_init(&def, sizeof def);
     def.integrator = method;
     def.controller = "halving";
     def.integrator_settings = settings;
@@ -481,7 +478,6 @@ static bool run(const extreme *c, const char *method, unsigned bit)
     const char *wrong = complaint(c, &o, status, bit);
     if (wrong)
         printf("# %s, %s: %s\n", c->name, method, wrong);
-    scene_close(&s);
     return !wrong;
 }
 
@@ -499,50 +495,44 @@ static void run_all(const char *method, unsigned bit)
     ck_assert_msg(good == runs, "%d of %d: see above", runs - good, runs);
 }
 
-START_TEST(be_ends_whatever_the_scene_is)
+TEST(be_ends_whatever_the_scene_is)
 {
     run_all("be", BE);
 }
-END_TEST
 
-START_TEST(bdf2_ends_whatever_the_scene_is)
+TEST(bdf2_ends_whatever_the_scene_is)
 {
     run_all("bdf2", BDF2);
 }
-END_TEST
 
-START_TEST(midpoint_ends_whatever_the_scene_is)
+TEST(midpoint_ends_whatever_the_scene_is)
 {
     run_all("midpoint", MIDPOINT);
 }
-END_TEST
 
-START_TEST(trbdf2_ends_whatever_the_scene_is)
+TEST(trbdf2_ends_whatever_the_scene_is)
 {
     run_all("trbdf2", TRBDF2);
 }
-END_TEST
 
-START_TEST(ida_ends_whatever_the_scene_is)
+TEST(ida_ends_whatever_the_scene_is)
 {
     run_all("ida", IDA);
 }
-END_TEST
 
-START_TEST(dirk_ends_whatever_the_scene_is)
+TEST(dirk_ends_whatever_the_scene_is)
 {
     run_all("dirk", DIRK);
 }
-END_TEST
 
 /*
  * The report's triangle with an altitude of 1e-12 is at the limit of validation: below it is refused and
  * named.
  */
-START_TEST(validation_refuses_an_altitude_below_1e_12)
+TEST(validation_refuses_an_altitude_below_1e_12)
 {
     static sheet mesh;
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     memset(&mesh, 0, sizeof mesh);
     sliver(&mesh);
     mesh.x[8] = 0.9e-12;
@@ -550,10 +540,4 @@ START_TEST(validation_refuses_an_altitude_below_1e_12)
     ck_assert_ptr_null(s.model);
     ck_assert_msg(strstr(drape_context_message(s.ctx), "triangle 0 (nodes 0 2 1) is degenerate"), "%s",
                   drape_context_message(s.ctx));
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("extremes", be_ends_whatever_the_scene_is, bdf2_ends_whatever_the_scene_is,
-      midpoint_ends_whatever_the_scene_is, trbdf2_ends_whatever_the_scene_is, ida_ends_whatever_the_scene_is,
-      dirk_ends_whatever_the_scene_is, validation_refuses_an_altitude_below_1e_12)

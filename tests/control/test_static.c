@@ -5,9 +5,9 @@
  */
 #include "support/scene.h"
 
-START_TEST(a_free_sheet_has_no_equilibrium_and_ends)
+TEST(a_free_sheet_has_no_equilibrium_and_ends)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 5, 'edge_length': 0.02}, "
         "'material': {'young_modulus': 1e6, 'thickness': 0.01, 'areal_density': 0.2}, 'terms': "
         "['stretch.edge', 'bend.hinge']}], 'integrator': {'method': 'static', 'dt': 1, 'tolerance': 1e-9}, "
@@ -24,15 +24,13 @@ START_TEST(a_free_sheet_has_no_equilibrium_and_ends)
     ck_assert_msg(strncmp(drape_context_message(s.ctx), "t=0 h=1: ", 9) == 0, "%s",
                   drape_context_message(s.ctx));
     ck_assert_int_lt(done.newton_iterations, 50000);
-    scene_close(&s);
 }
-END_TEST
 
 /* A sheet that lies on another: the nodes that contact couples are not coupled in the model's pattern, but
  * must be in the Hessian. Each wrong sign would be a mode. */
-START_TEST(one_sheet_lies_on_another)
+TEST(one_sheet_lies_on_another)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'name': 'low', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': "
         "0.2,"
         " 'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
@@ -48,8 +46,4 @@ START_TEST(one_sheet_lies_on_another)
     ck_assert(drape_sim_energy(s.sim).contact > 0);
     ck_assert(found.stability_known);
     ck_assert_int_eq(found.unstable_modes, 0);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("static", a_free_sheet_has_no_equilibrium_and_ends, one_sheet_lies_on_another)

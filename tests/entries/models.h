@@ -11,6 +11,7 @@
 #include "assemble/system.h"
 #include "base/param.h"
 #include "drape/extend.h"
+#include "support/context.h"
 
 /* ---- Random numbers
  * --------------------------------------------------------------------------------------------- */
@@ -104,12 +105,9 @@ static inline drape_status try_model(drape_context *ctx, const model_def *def, d
     const drape_setting equilateral[] = {{"edges", 3, NULL}, {"edge_length", 0.1, NULL}};
     const drape_setting square[] = {
         {"columns", 4, NULL}, {"rows", 5, NULL}, {"width", 0.3, NULL}, {"height", 0.5, NULL}};
-    drape_scene_def scene;
-    drape_cloth_def cloth;
-    drape_pin_def pin;
-    drape_scene_def_init(&scene, sizeof scene);
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_pin_def_init(&pin, sizeof pin);
+    drape_scene_def scene = scene_def();
+    drape_cloth_def cloth = cloth_def();
+    drape_pin_def pin = pin_def();
     if (def->mesh == MESH_EQUILATERAL)
         cloth.mesh.grid = (drape_entry_def){"equilateral", equilateral, 2};
     else if (def->mesh == MESH_SQUARE)
@@ -139,16 +137,8 @@ static inline drape_status try_model(drape_context *ctx, const model_def *def, d
 static inline drape_model *make_model(drape_context *ctx, const model_def *def)
 {
     drape_model *model = NULL;
-    drape_status status = try_model(ctx, def, &model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, try_model(ctx, def, &model));
     return model;
-}
-
-static inline drape_context *make_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
 }
 
 static inline drape_system *make_system(drape_arena *arena, const drape_model *model, int threads)

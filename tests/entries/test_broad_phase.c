@@ -216,7 +216,7 @@ static void compare_forces(drape_contact *a, drape_contact *b, size_t n, double 
 
 static void check_that_all_near_is_found(const char *text, int least_active, int share_crossing)
 {
-    scene s = scene_model(text, "");
+    scoped_scene s = scene_model(text, "");
     const drape_model *m = s.model;
     const size_t n = 3 * (size_t)m->node_count;
     uint64_t seed = 3;
@@ -267,31 +267,29 @@ static void check_that_all_near_is_found(const char *text, int least_active, int
     ck_assert_int_gt(crossing, ROUNDS / share_crossing);
     ck_assert_int_gt(passing, ROUNDS / share_crossing);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
 
-START_TEST(everything_near_is_found)
+TEST(everything_near_is_found)
 {
     check_that_all_near_is_found(SELF, 5, 10);
 }
-END_TEST
 
-START_TEST(all_near_a_few_features_is_found)
+TEST(all_near_a_few_features_is_found)
 {
     check_that_all_near_is_found(FEW_FEATURES, 1, 20);
 }
-END_TEST
 
 /* A capsule comes 2 cm nearer from below to a flat sheet whose rows of nodes, 6.25 cm apart, are on both
  * sides of it. Nodes that slide on it would leave the middle of the edges between them 12 mm inside. It is
  * put where it is half of the activation distance of 2 mm away; the nearest point of oblique edges is beside
  * it. */
-START_TEST(edges_do_not_slide_into_bodies)
+TEST(edges_do_not_slide_into_bodies)
 {
-    scene s = scene_model("{'drape': 1, 'cloth': [" SHEET "], 'contact': {}, 'duration': 1, 'colliders': ["
-                          "{'type': 'capsule', 'a': [-0.3,-0.052,-0.03125], 'b': [0.6,-0.052,-0.03125],"
-                          " 'radius': 0.05, 'track': [[0,[0,0,0]], [1,[0,1,0]]]}]%s}",
-                          "");
+    scoped_scene s =
+        scene_model("{'drape': 1, 'cloth': [" SHEET "], 'contact': {}, 'duration': 1, 'colliders': ["
+                    "{'type': 'capsule', 'a': [-0.3,-0.052,-0.03125], 'b': [0.6,-0.052,-0.03125],"
+                    " 'radius': 0.05, 'track': [[0,[0,0,0]], [1,[0,1,0]]]}]%s}",
+                    "");
     const drape_model *m = s.model;
     const size_t n = 3 * (size_t)m->node_count;
     drape_arena arena = drape_arena_of(s.ctx);
@@ -315,19 +313,18 @@ START_TEST(edges_do_not_slide_into_bodies)
     }
     ck_assert_double_ge(least, 0.5e-3);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
 
 /* Sheets 3 cm apart, the lower one 5 cm above a ball: what they meet is what their velocities bring together
  * within the time, less the activation distance of 1.5 cm or, of layers, the least gap. */
-START_TEST(what_may_be_met_is_known)
+TEST(what_may_be_met_is_known)
 {
-    scene s = scene_model("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2},"
-                          "'contact': {'distance': 1.5e-2}, 'duration': 1, 'colliders': ["
-                          "{'type': 'sphere', 'center': [0,-0.55,0], 'radius': 0.5,"
-                          " 'track': [[0,[0,0,0]], [0.5,[0,0,0]], [1,[0,0.5,0]]]}]%s}",
-                          "");
+    scoped_scene s =
+        scene_model("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 1e-2},"
+                    "'contact': {'distance': 1.5e-2}, 'duration': 1, 'colliders': ["
+                    "{'type': 'sphere', 'center': [0,-0.55,0], 'radius': 0.5,"
+                    " 'track': [[0,[0,0,0]], [0.5,[0,0,0]], [1,[0,0.5,0]]]}]%s}",
+                    "");
     static const struct {
         double t, lower, upper, seconds; /* [s], [m/s] upwards, [s] */
         bool meets;
@@ -362,9 +359,4 @@ START_TEST(what_may_be_met_is_known)
         }
     }
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("broad_phase", everything_near_is_found, all_near_a_few_features_is_found,
-      edges_do_not_slide_into_bodies, what_may_be_met_is_known)

@@ -139,8 +139,7 @@ static drape_status advance(drape_sim *sim, double t)
 static drape_sim *make_sim(scene *s, watcher *w)
 {
     drape_sim *sim = NULL;
-    drape_status status = drape_sim_create(s->ctx, s->model, NULL, &sim);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_create(s->ctx, s->model, NULL, &sim));
     if (w)
         ck_assert_int_eq(drape_sim_observe(sim, watch, w), DRAPE_OK);
     return sim;
@@ -169,12 +168,10 @@ static void same_contact(drape_sim *a, drape_sim *b, const char *what)
 static void check_contact(scene *s, const bytes *middle, const char *what)
 {
     watcher one_watch = {.save_at = -1}, other_watch = {.save_at = -1};
-    drape_sim *one = make_sim(s, &one_watch), *other = make_sim(s, &other_watch);
+    scoped_sim *one = make_sim(s, &one_watch), *other = make_sim(s, &other_watch);
     advance(one, MIDDLE);
     ck_assert_int_eq(drape_sim_restore_from(other, middle->data, middle->size), DRAPE_OK);
     same_contact(one, other, what);
-    drape_sim_destroy(&one);
-    drape_sim_destroy(&other);
 }
 
 /* One sim runs to the end and is saved at a frame within an advance and between two advances. Two others are
@@ -182,7 +179,7 @@ static void check_contact(scene *s, const bytes *middle, const char *what)
 static void check(scene *s, const char *what)
 {
     watcher whole = {.save_at = 20}, from_frame = {.save_at = -1}, from_middle = {.save_at = -1};
-    drape_sim *sim = make_sim(s, &whole);
+    scoped_sim *sim = make_sim(s, &whole);
     drape_status first = advance(sim, MIDDLE);
     bytes middle = bytes_save(sim);
     check_contact(s, &middle, what);
@@ -221,7 +218,6 @@ static void check(scene *s, const char *what)
            (long long)counts.steps_rejected, middle.size, (int)second);
     free(middle.data);
     free(whole.saved.data);
-    drape_sim_destroy(&sim);
 }
 
 static void check_sheet(int edges, const char *terms, const char *more, const char *integrator,
@@ -229,15 +225,14 @@ static void check_sheet(int edges, const char *terms, const char *more, const ch
 {
     char name[200];
     snprintf(name, sizeof name, "%s, %s%s, %s", what, integrator, settings, controller);
-    scene s = scene_model(SHEET, edges, terms, more, integrator, settings, controller);
+    scoped_scene s = scene_model(SHEET, edges, terms, more, integrator, settings, controller);
     check(&s, name);
-    scene_close(&s);
 }
 
 /* ---- Tests ---- */
 
 /* All integrators get all settings: each ignores the parameters of the others. */
-START_TEST(every_integrator_resumes)
+TEST(every_integrator_resumes)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -248,9 +243,8 @@ START_TEST(every_integrator_resumes)
         check_sheet(4, ", {'type': 'limit.strain', 'limit': 0.1}", "", name, "", "halving", "limit");
     }
 }
-END_TEST
 
-START_TEST(every_newton_variant_resumes)
+TEST(every_newton_variant_resumes)
 {
     static const char *const settings[] = {", 'globalization': 'none'", ", 'globalization': 'line_search'",
                                            ", 'on_failure': 'accept', 'max_iterations': 1"};
@@ -263,10 +257,9 @@ START_TEST(every_newton_variant_resumes)
             check_sheet(4, "", OBSTACLES, methods[k], settings[i], "halving", "newton, obstacles");
         }
 }
-END_TEST
 
 /* Large enough for solvers that pass small matrices to another solver: 7 edges are 186 unknowns. */
-START_TEST(every_linear_solver_resumes)
+TEST(every_linear_solver_resumes)
 {
     static const char *const methods[] = {"be", "ida", "dirk"};
     for (int i = 0; drape_linears[i]; i++)
@@ -279,9 +272,8 @@ START_TEST(every_linear_solver_resumes)
             check_sheet(3, "", "", methods[k], settings, "halving", "solver");
         }
 }
-END_TEST
 
-START_TEST(every_controller_resumes)
+TEST(every_controller_resumes)
 {
     for (int i = 0; drape_controllers[i]; i++)
         for (int k = 0; drape_integrators[k]; k++) {
@@ -292,9 +284,8 @@ START_TEST(every_controller_resumes)
                         "controller");
         }
 }
-END_TEST
 
-START_TEST(cloth_on_cloth_resumes)
+TEST(cloth_on_cloth_resumes)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -304,23 +295,21 @@ START_TEST(cloth_on_cloth_resumes)
                 continue;
             char what[100];
             snprintf(what, sizeof what, "layers, %s%s", name, settings[k]);
-            scene s = scene_model(LAYERS, name, settings[k], "halving");
+            scoped_scene s = scene_model(LAYERS, name, settings[k], "halving");
             check(&s, what);
-            scene_close(&s);
         }
     }
 }
-END_TEST
 
 /* A node on a drag spring, a user-defined start, frames with a budget that is never reached. */
-START_TEST(what_a_host_did_is_restored)
+TEST(what_a_host_did_is_restored)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
         if (drape_integrators[i]->steady_state)
             continue;
-        scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
-        drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
+        scoped_scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
+        scoped_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
         const double target[3] = {0.1, 0.05, 0.1};
         ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
         ck_assert_int_eq(drape_sim_set_state(one, 0.05, drape_sim_positions(one), drape_sim_velocities(one)),
@@ -329,7 +318,7 @@ START_TEST(what_a_host_did_is_restored)
             drape_sim_set_state(one, MIDDLE, drape_sim_positions(one), drape_sim_velocities(one)), DRAPE_OK);
         ck_assert_int_eq(drape_sim_set_drag_spring(one, 7, 0.5, target), DRAPE_OK);
         ck_assert_int_eq(drape_sim_advance_realtime(one, 0.017, 1e9, NULL), DRAPE_OK);
-        bytes saved = bytes_save(one), again = bytes_save(one);
+        scoped_bytes saved = bytes_save(one), again = bytes_save(one);
         ck_assert_uint_eq(saved.size, again.size);
         ck_assert_mem_eq(saved.data, again.data, saved.size);
         ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
@@ -346,48 +335,35 @@ START_TEST(what_a_host_did_is_restored)
             ck_assert_int_eq(advance(sim, END), DRAPE_OK);
         }
         same_end(one, other, name);
-        free(saved.data);
-        free(again.data);
-        drape_sim_destroy(&one);
-        drape_sim_destroy(&other);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* An equilibrium also reports whether it is stable. */
-START_TEST(an_equilibrium_resumes)
+TEST(an_equilibrium_resumes)
 {
-    scene s = scene_model(SHEET, 3, "", "", "static", "", "halving");
-    drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
+    scoped_scene s = scene_model(SHEET, 3, "", "", "static", "", "halving");
+    scoped_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
     ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
-    bytes saved = bytes_save(one);
+    scoped_bytes saved = bytes_save(one);
     ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
     ck_assert(drape_sim_statistics(other).stability_known);
     same_end(one, other, "equilibrium");
     ck_assert_int_eq(advance(one, END), DRAPE_OK);
     ck_assert_int_eq(advance(other, END), DRAPE_OK);
     same_end(one, other, "equilibrium");
-    free(saved.data);
-    drape_sim_destroy(&one);
-    drape_sim_destroy(&other);
-    scene_close(&s);
 }
-END_TEST
 
-START_TEST(a_sheet_that_buckles_resumes)
+TEST(a_sheet_that_buckles_resumes)
 {
     static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2"};
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         for (int k = 0; drape_linears[k]; k++) {
             char what[100];
             snprintf(what, sizeof what, "buckling, %s, %s", methods[i], drape_linears[k]->entry.name);
-            scene s = scene_model(BUCKLING, methods[i], drape_linears[k]->entry.name);
+            scoped_scene s = scene_model(BUCKLING, methods[i], drape_linears[k]->entry.name);
             check(&s, what);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* A wind that oscillates. */
 static void blow(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
@@ -400,16 +376,16 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
 /* Pins that the host moves, one of them fixed by the scene; a collider; forces; a wind, which is set again on
  * the sim that is restored. The checkpoint is taken while they move; after the restoration the motions can
  * still be cancelled. */
-START_TEST(what_a_host_moves_is_restored)
+TEST(what_a_host_moves_is_restored)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
         if (drape_integrators[i]->steady_state)
             continue;
-        scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
+        scoped_scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
         size_t n = 3 * (size_t)s.model->node_count;
-        double *push = calloc(n, sizeof *push);
-        drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
+        scoped_memory double *push = calloc(n, sizeof *push);
+        scoped_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
         const int32_t pins[] = {0, 4};
         const double to[6] = {0.01, 0.01, 0.02, 0.19, 0.02, 0}, away[3] = {0.02, -0.01, 0};
         push[3 * 12 + 1] = 0.01;
@@ -421,7 +397,7 @@ START_TEST(what_a_host_moves_is_restored)
         ck_assert_int_eq(drape_sim_move_collider(one, 0, 0.07, away, away), DRAPE_OK);
         ck_assert_int_eq(drape_sim_push(one, push), DRAPE_OK);
         ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
-        bytes saved = bytes_save(one);
+        scoped_bytes saved = bytes_save(one);
         drape_status status = drape_sim_restore_from(other, saved.data, saved.size);
         ck_assert_msg(status == DRAPE_OK, "%s: %s", name, drape_context_message(s.ctx));
         same_contact(one, other, name);
@@ -433,16 +409,5 @@ START_TEST(what_a_host_moves_is_restored)
         const double *x = drape_sim_positions(other) + 3 * pins[0];
         ck_assert_msg(first || (x[0] == to[0] && x[2] == to[2]), "%s: the pin is at %g %g %g", name, x[0],
                       x[1], x[2]);
-        free(saved.data);
-        free(push);
-        drape_sim_destroy(&one);
-        drape_sim_destroy(&other);
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("entries/checkpoint", what_a_host_moves_is_restored, a_sheet_that_buckles_resumes,
-      what_a_host_did_is_restored, an_equilibrium_resumes, every_integrator_resumes,
-      every_newton_variant_resumes, every_linear_solver_resumes, every_controller_resumes,
-      cloth_on_cloth_resumes)

@@ -261,10 +261,9 @@ static void each_variant(visit *one)
 {
     enter_folder();
     for (size_t i = 0; i < VARIANTS; i++) {
-        scene s = with_collider(variants[i].text);
+        scoped_scene s = with_collider(variants[i].text);
         ck_assert_str_eq(s.model->colliders[0].ops->entry.name, variants[i].collider);
         one(&s.model->colliders[0], &variants[i]);
-        scene_close(&s);
     }
     folder_leave();
 }
@@ -274,7 +273,7 @@ static double distance_of(const drape_collider *c, const double *x, double *norm
     return c->ops->distance(c->values, &c->shape, x, normal, curvature);
 }
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     for (int i = 0; drape_colliders[i]; i++) {
         const drape_collider_ops *ops = drape_colliders[i];
@@ -287,7 +286,6 @@ START_TEST(entries_are_well_formed)
         ck_assert_msg(tried, "no variant of %s is tested", ops->entry.name);
     }
 }
-END_TEST
 
 /* ---- The distance against brute force ---- */
 
@@ -340,11 +338,10 @@ static void check_distance(const drape_collider *c, const struct variant *v)
     }
 }
 
-START_TEST(distances_are_exact)
+TEST(distances_are_exact)
 {
     each_variant(check_distance);
 }
-END_TEST
 
 /* ---- Derivatives ---- */
 
@@ -419,11 +416,10 @@ static void check_derivatives(const drape_collider *c, const struct variant *v)
     ck_assert(curved > 1000 || strcmp(v->collider, "plane") == 0);
 }
 
-START_TEST(derivatives_are_exact)
+TEST(derivatives_are_exact)
 {
     each_variant(check_derivatives);
 }
-END_TEST
 
 /* Outside, the normal of a smooth collider is continuous: between places 1e-7 apart and at least 0.05 off the
  * surface it turns by no more than 1e-7/0.05, past edges too. */
@@ -445,11 +441,10 @@ static void check_smooth(const drape_collider *c, const struct variant *v)
     }
 }
 
-START_TEST(normals_are_continuous_outside)
+TEST(normals_are_continuous_outside)
 {
     each_variant(check_smooth);
 }
-END_TEST
 
 /* Where the gradient is not unique: centers, axes, and the points and edges of the shape. */
 static void check_everywhere(const drape_collider *c, const struct variant *v)
@@ -473,11 +468,10 @@ static void check_everywhere(const drape_collider *c, const struct variant *v)
     }
 }
 
-START_TEST(the_distance_is_defined_everywhere)
+TEST(the_distance_is_defined_everywhere)
 {
     each_variant(check_everywhere);
 }
-END_TEST
 
 /* ---- Shapes ---- */
 
@@ -511,13 +505,12 @@ static void check_shape(const drape_collider *c, const struct variant *v)
     }
 }
 
-START_TEST(shapes_lie_on_the_surface)
+TEST(shapes_lie_on_the_surface)
 {
     each_variant(check_shape);
 }
-END_TEST
 
-START_TEST(shapes_have_the_right_features)
+TEST(shapes_have_the_right_features)
 {
     static const struct {
         const char *text;
@@ -540,39 +533,33 @@ START_TEST(shapes_have_the_right_features)
     };
     enter_folder();
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        scene s = with_collider(cases[i].text);
+        scoped_scene s = with_collider(cases[i].text);
         const drape_collider_shape *shape = &s.model->colliders[0].shape;
         ck_assert_msg(shape->point_count == cases[i].points && shape->segment_count == cases[i].segments &&
                           shape->triangle_count == cases[i].triangles && shape->radius == cases[i].radius,
                       "%s: %d points, %d segments, %d triangles, radius %g", cases[i].text,
                       (int)shape->point_count, (int)shape->segment_count, (int)shape->triangle_count,
                       shape->radius);
-        scene_close(&s);
     }
     folder_leave();
 }
-END_TEST
 
 /* ---- What is refused ---- */
 
 static void refused(const char *text, const char *says)
 {
-    scene s = scene_empty();
-    drape_scene *parsed = NULL;
+    scoped_scene s = scene_empty();
+    scoped_parsed *parsed = NULL;
     char whole[4096];
     snprintf(whole, sizeof whole, SCENE, text);
-    for (char *c = whole; *c; c++)
-        if (*c == '\'')
-            *c = '"';
+    quote(whole);
     ck_assert_int_eq(drape_scene_parse(s.ctx, whole, "s.json", &parsed), DRAPE_OK);
     ck_assert_msg(drape_scene_compile(parsed, &s.model) < 0, "accepted: %s", text);
     ck_assert_msg(strstr(drape_context_message(s.ctx), says), "%s\nsays \"%s\"\nnot \"%s\"", text,
                   drape_context_message(s.ctx), says);
-    drape_scene_destroy(&parsed);
-    scene_close(&s);
 }
 
-START_TEST(meshes_that_are_no_solid_are_refused)
+TEST(meshes_that_are_no_solid_are_refused)
 {
     const char *mesh = "{'type': 'mesh', 'file': 'wrong.obj'}";
     enter_folder();
@@ -593,14 +580,13 @@ START_TEST(meshes_that_are_no_solid_are_refused)
         "/colliders/0: node 1 is at (1e+09, -0.5, -0.5) m; coordinates must be finite and within 1e+09 m");
     folder_leave();
 }
-END_TEST
 
 /* ---- Where a collider is ---- */
 
-START_TEST(poses_follow_the_track)
+TEST(poses_follow_the_track)
 {
-    scene s = with_collider("{'type': 'sphere', 'center': [1, 0, 0], 'radius': 0.5,"
-                            " 'track': [[1, [0, 0, 0]], [3, [0, 4, 0]], [4, [0, 4, 1]]]}");
+    scoped_scene s = with_collider("{'type': 'sphere', 'center': [1, 0, 0], 'radius': 0.5,"
+                                   " 'track': [[1, [0, 0, 0]], [3, [0, 4, 0]], [4, [0, 4, 1]]]}");
     const drape_collider *c = &s.model->colliders[0];
     static const struct {
         double t, y, z, vy, vz;
@@ -620,9 +606,7 @@ START_TEST(poses_follow_the_track)
         ck_assert_double_eq(drape_collider_distance(c, &pose, x, n, NULL), 1.5);
         ck_assert_double_eq(n[1], 1);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Turning ---- */
 
@@ -638,9 +622,9 @@ static void point_at(const drape_collider *c, double t, const double *own, doubl
 /* Keys about one axis, a piece of more than a turn; then quaternions. The rates are those of the keys, and
  * the velocity of a point is the rate of its place: by differences over 2e-6 s, to (3 rad/s)^3 1e-12/6 m
  * of the cubic, and rounding of 1e-16/1e-6 m/s. */
-START_TEST(poses_follow_the_turns)
+TEST(poses_follow_the_turns)
 {
-    scene s = with_collider(
+    scoped_scene s = with_collider(
         "{'type': 'box', 'center': [1, 0, 0], 'size': [0.2, 0.4, 0.6], 'pivot': [1, 0, 0.5],"
         " 'track': [[0, [0, 0, 0]], [4, [4, 0, 0]]], 'turns': [{'time': 1, 'rotate': [0, 0, 2, 0]},"
         " {'time': 3, 'rotate': [0, 0, 3, 450]}, {'time': 4, 'rotate': [0, 0, -1, -90]},"
@@ -674,9 +658,7 @@ START_TEST(poses_follow_the_turns)
         for (int k = 0; k < 3; k++)
             ck_assert_double_eq_tol(v[k], (after[k] - before[k]) / (2 * h), 1e-8);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* In a turned pose the distance is that of the point in the collider's own coordinates, and its
  * derivatives in space are exact: that of the distance along a direction is normal . u, that of the normal
@@ -718,15 +700,14 @@ static void check_turned(const drape_collider *c, const struct variant *v)
     }
 }
 
-START_TEST(a_turned_pose_turns_the_distance)
+TEST(a_turned_pose_turns_the_distance)
 {
     each_variant(check_turned);
 }
-END_TEST
 
 /* From one pose to another: the ends are those of the poses, a point that is carried along rests, and no
  * point is faster than the bound: 100 places on each of 40 paths. */
-START_TEST(swings_lead_from_pose_to_pose)
+TEST(swings_lead_from_pose_to_pose)
 {
     for (int i = 0; i < 40; i++) {
         drape_collider_pose from = {.t = 0}, to = {.t = 1};
@@ -765,9 +746,3 @@ START_TEST(swings_lead_from_pose_to_pose)
             ck_assert_double_eq_tol(before[k], own[k], 1e-14);
     }
 }
-END_TEST
-
-SUITE("colliders", entries_are_well_formed, distances_are_exact, derivatives_are_exact,
-      normals_are_continuous_outside, the_distance_is_defined_everywhere, shapes_lie_on_the_surface,
-      shapes_have_the_right_features, meshes_that_are_no_solid_are_refused, poses_follow_the_track,
-      poses_follow_the_turns, a_turned_pose_turns_the_distance, swings_lead_from_pose_to_pose)

@@ -76,6 +76,8 @@ static void close_probe(probe *t)
     scene_close(&t->s);
 }
 
+#define scoped_probe SCOPED(close_probe) probe
+
 static void force_beside(probe *t, drape_point point, double s, double *g)
 {
     for (size_t i = 0; i < 3 * (size_t)t->s.model->node_count; i++) {
@@ -233,7 +235,7 @@ static void check(probe *t, const char *what, double time)
     assert_below(still, 1e-5);
 }
 
-START_TEST(every_collider)
+TEST(every_collider)
 {
     folder_enter();
     folder_write("octahedron.obj", octahedron);
@@ -256,13 +258,11 @@ START_TEST(every_collider)
                 " 'colliders': [{%s, 'friction': 0.4, 'track': [[0, [0,0,0]], [1, [%g,0,0]]]%s}],"
                 " 'contact': {'distance': 4e-3, 'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
                 settings[i].text, k % 3 ? 0.05 : 0, k % 3 == 2 ? turns : "", k / 3 ? "lagged" : "implicit");
-            probe t = open_probe(s, settings[i].top + 2e-3, 11 + i);
+            scoped_probe t = open_probe(s, settings[i].top + 2e-3, 11 + i);
             check(&t, settings[i].text, 0.02);
-            close_probe(&t);
         }
     folder_leave();
 }
-END_TEST
 
 /* A square grid with so many nodes a side under a triangle with so many edges a side. */
 static scene two_cloths(int columns, int edges, const char *pins, bool lagged)
@@ -278,36 +278,32 @@ static scene two_cloths(int columns, int edges, const char *pins, bool lagged)
         columns, columns, edges, pins, lagged ? "lagged" : "implicit");
 }
 
-START_TEST(cloth_on_cloth)
+TEST(cloth_on_cloth)
 {
     for (int k = 0; k < 2; k++) {
         scene s = two_cloths(6, 4, "{'nodes': [3]}", k);
-        probe t = open_probe(s, -0.028, 17);
+        scoped_probe t = open_probe(s, -0.028, 17);
         check(&t, "cloth on cloth", 0.02);
-        close_probe(&t);
     }
 }
-END_TEST
 
 /* Layers that are as near as twice their least gap. Derivatives change over the gap of 8e-6 m there, so
  * with a difference over e = 1e-8 m the truncation error is (e/gap)^2 = 2e-6, the rounding error 1e-16
  * 0.3 / e = 3e-9. */
-START_TEST(near_the_least_gap)
+TEST(near_the_least_gap)
 {
     for (int k = 0; k < 2; k++) {
         scene s = two_cloths(4, 3, "", k);
         double gap;
-        probe t = open_probe(s, 0, 17);
+        scoped_probe t = open_probe(s, 0, 17);
         for (int32_t i = 0; i < s.model->node_count; i++) /* flat, one 8e-6 m above the other */
             t.at.x[3 * (size_t)i + 1] = i < s.model->cloths[1].first_node ? 0 : 8e-6;
         ck_assert_int_eq(drape_system_begin(t.system, &t.at), DRAPE_OK);
         check(&t, "near the least gap", 0.02);
         drape_contact_active(drape_system_contact(t.system), &gap);
         assert_below(gap, 9e-6);
-        close_probe(&t);
     }
 }
-END_TEST
 
 /* A flat sheet of 1 kg/m2 above a floor, with contact of 4 mm and 1e5 N/m. */
 static probe open_flat(double height)
@@ -329,24 +325,22 @@ static probe open_flat(double height)
 /* What is left of the gap by a correction that leads far beyond the floor. */
 static double left_of(double gap)
 {
-    probe t = open_flat(gap);
+    scoped_probe t = open_flat(gap);
     memcpy(t.x, t.at.x, 3 * (size_t)t.s.model->node_count * sizeof *t.x);
     for (int32_t i = 0; i < t.s.model->node_count; i++)
         t.x[3 * i + 1] -= 10 * gap;
     const double left = gap - 10 * gap * drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL);
-    close_probe(&t);
     return left;
 }
 
 /* From beyond the activation distance a correction arrives at half of it at once, however far it comes from;
  * within it, half of the gap is left. A path is cut up to a fifth of that before. */
-START_TEST(a_correction_arrives_from_beyond_the_distance)
+TEST(a_correction_arrives_from_beyond_the_distance)
 {
     for (double gap = 0.01; gap < 1; gap *= 3)
         ck_assert_double_eq_tol(left_of(gap), 2.2e-3, 0.2e-3 * (1 + 1e-9));
     ck_assert_double_eq_tol(left_of(3e-3), 1.65e-3, 0.15e-3 * (1 + 1e-9));
 }
-END_TEST
 
 /* The sum of J p over the nodes, along y. */
 static double stiffness_along(probe *t, const double *p)
@@ -372,10 +366,10 @@ static double stiffness_along(probe *t, const double *p)
  * beyond. The next Jacobian leads to the gap with that force, which is positive: its secant is stiffer than
  * the tangent, and the correction that it allows under that force ends before the floor. Without a
  * correction, and after predictions are forgotten, the Jacobian has the bits of the tangent. */
-START_TEST(the_jacobian_has_the_predicted_forces)
+TEST(the_jacobian_has_the_predicted_forces)
 {
     const double gap = 3e-3, h = 0.01;
-    probe t = open_flat(gap);
+    scoped_probe t = open_flat(gap);
     const int32_t n = t.s.model->node_count;
     double *down = take(&t, 3 * (size_t)n), *none = take(&t, 3 * (size_t)n), before = 0;
     for (int32_t i = 0; i < n; i++)
@@ -395,17 +389,15 @@ START_TEST(the_jacobian_has_the_predicted_forces)
     ck_assert_double_lt((force - before) / (secant / -5e-3), gap);
     drape_system_predict_contact(t.system, NULL, 0, 0);
     ck_assert_double_eq(stiffness_along(&t, down), tangent);
-    close_probe(&t);
 }
-END_TEST
 
 /* Whoever cancels need not wait until all pairs have been looked at: nothing moves, which is always safe. */
-START_TEST(a_cancelled_search_moves_nothing)
+TEST(a_cancelled_search_moves_nothing)
 {
-    probe t = open_flat(3e-3);
+    scoped_probe t = open_flat(3e-3);
     const size_t nodes = (size_t)t.s.model->node_count;
     atomic_bool cancel = false;
-    double *fraction = calloc(nodes, sizeof *fraction);
+    scoped_memory double *fraction = calloc(nodes, sizeof *fraction);
     ck_assert_ptr_nonnull(fraction);
     for (size_t i = 0; i < 3 * nodes; i++)
         t.x[i] = t.at.x[i] - (i % 3 == 1 ? 1e-3 : 0);
@@ -418,13 +410,10 @@ START_TEST(a_cancelled_search_moves_nothing)
         ck_assert_double_eq(fraction[i], 0);
     atomic_store(&cancel, false);
     ck_assert_double_gt(drape_system_step_fraction(t.system, t.at.x, t.x, 0.01, false, NULL), 0);
-    free(fraction);
-    close_probe(&t);
 }
-END_TEST
 
 /* A state with NaN has no effect on later ones: the next evaluation is as before it. */
-START_TEST(nan_is_forgotten)
+TEST(nan_is_forgotten)
 {
     scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': "
@@ -433,7 +422,7 @@ START_TEST(nan_is_forgotten)
         " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, 'colliders': ["
         " {'type': 'box', 'center': [0.1,-0.1,-0.1], 'size': [0.2,0.2,0.2], 'friction': 0.4},"
         " {'type': 'sphere', 'center': [0.1,-0.1,-0.1], 'radius': 0.1, 'friction': 0.4}], 'duration': 1}");
-    probe t = open_probe(s, 2e-3, 3);
+    scoped_probe t = open_probe(s, 2e-3, 3);
     const size_t n = 3 * (size_t)s.model->node_count;
     drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal, .t = 0.01, .span = {0, 0.01}};
     double gap;
@@ -454,23 +443,22 @@ START_TEST(nan_is_forgotten)
         ck_assert_int_eq(memcmp(t.g[0], t.g[1], n * sizeof *t.g[0]), 0);
     }
     ck_assert_int_eq(drape_system_status(t.system), DRAPE_OK);
-    close_probe(&t);
 }
-END_TEST
 
 /* `drape check` compares contact forces in scenes with contact, and only there. */
-START_TEST(only_scenes_with_contact_have_it_checked)
+TEST(only_scenes_with_contact_have_it_checked)
 {
     static const char *const more[] = {
         "", ", 'colliders': [{'type': 'box', 'center': [0,-1,0], 'size': [0.2,0.2,0.2], 'friction': 0.4}]",
         ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}, 'contact': {'friction': 'lagged'}"};
     static drape_check_result found[DRAPE_MAX_CHECK_RESULTS];
     for (int k = 0; k < 3; k++) {
-        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, "
-                             "'width': 0.3, 'height':"
-                             " 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
-                             " 'terms': ['stretch.edge']}]%s, 'duration': 1}",
-                             more[k]);
+        scoped_scene s =
+            scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, "
+                       "'width': 0.3, 'height':"
+                       " 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
+                       " 'terms': ['stretch.edge']}]%s, 'duration': 1}",
+                       more[k]);
         int count = 0, contact = 0, self = 0;
         ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 1, found, &count), DRAPE_OK);
         for (int i = 0; i < count; i++) {
@@ -480,20 +468,18 @@ START_TEST(only_scenes_with_contact_have_it_checked)
         }
         ck_assert_int_eq(contact, k == 1 ? 2 : 0);
         ck_assert_int_eq(self, k == 2 ? 2 : 0);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Without colliders and self-contact, contact takes no time and no memory. The time of contact is separate
  * from the other parts of a step, not within them: the sum of all parts is at most the time of the steps,
  * up to the rounding of sums. */
-START_TEST(scenes_without_contact_pay_nothing)
+TEST(scenes_without_contact_pay_nothing)
 {
     for (size_t k = 0; drape_integrators[k / 2]; k++) {
         const char *method = drape_integrators[k / 2]->entry.name;
         const bool there = k % 2;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
             "'height':"
             " 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
@@ -508,10 +494,8 @@ START_TEST(scenes_without_contact_pay_nothing)
                   (1 + 1e-9) * d.wall_steps);
         ck_assert_msg(there ? seconds > 0 : seconds == 0, "%s: %g s", method, seconds);
         ck_assert(there || !drape_system_contact(s.sim->system));
-        scene_close(&s);
     }
 }
-END_TEST
 
 #define LAYER                                                                                                \
     "{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': 0.3, 'transform': "        \
@@ -536,16 +520,15 @@ static void *count_allocation(void *user, size_t size)
 static void count_release(void *user, void *memory)
 {
     (void)user;
-    size_t *piece = (size_t *)memory - 2;
+    scoped_memory size_t *piece = (size_t *)memory - 2;
     allocated -= *piece;
-    free(piece);
 }
 
 /* A system reports its memory to the byte: contact with its lists as they have grown, and the extended
  * pattern. */
-START_TEST(all_bytes_are_counted)
+TEST(all_bytes_are_counted)
 {
-    scene s = scene_model(
+    scoped_scene s = scene_model(
         "{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-3, 'friction': 0.2},"
         " 'contact': {'distance': 4e-3, 'friction': 'lagged'}, 'colliders': ["
         " {'type': 'box', 'center': [0.1,-0.1,-0.1], 'size': [0.2,0.2,0.2], 'friction': 0.4},"
@@ -576,9 +559,7 @@ START_TEST(all_bytes_are_counted)
     ck_assert_uint_eq(allocated, 0);
     s.ctx->def = def;
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
 
 /* The energy, pair by pair, without merging. */
 typedef struct pairwise {
@@ -610,12 +591,12 @@ static void add_energy(void *user, const drape_pair *found)
 /* An active contact that several pairs share is counted once, with the area of all. The sum of energies is
  * that of all pairs, up to the rounding of some hundred positive numbers, and there are fewer contacts than
  * pairs. */
-START_TEST(active_contacts_are_all_pairs)
+TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"
                           " 'contact': {'distance': 4e-3}, 'duration': 1}",
                           0.0, 0.1);
-    probe t = open_probe(s, -0.08, 5);
+    scoped_probe t = open_probe(s, -0.08, 5);
     const drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal};
     drape_broad_phase broad;
     drape_arena arena = drape_arena_of(s.ctx);
@@ -631,9 +612,7 @@ START_TEST(active_contacts_are_all_pairs)
     ck_assert_double_gt(merged, 0);
     assert_below(fabs(merged / w.energy - 1), 1e-13);
     drape_arena_free(&arena);
-    close_probe(&t);
 }
-END_TEST
 
 /* A query between steps, for frames or for forces that a host reads, may make contact search at another
  * state. */
@@ -652,7 +631,7 @@ static void query(drape_sim *sim)
 
 static uint64_t collapse(bool watched)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 15, 'width': 0.3, "
         "'height': 0.5, 'orientation': 'vertical', 'noise': 1e-3, "
         "'transform': {'rotate': [1, 0, 0, 8], 'translate': [0, 0.51, 0]}},"
@@ -667,18 +646,10 @@ static uint64_t collapse(bool watched)
             query(s.sim);
     }
     const uint64_t hash = drape_sim_hash(s.sim);
-    scene_close(&s);
     return hash;
 }
 
-START_TEST(queries_change_nothing)
+TEST(queries_change_nothing)
 {
     ck_assert(collapse(true) == collapse(false));
 }
-END_TEST
-
-SUITE("contact_system", every_collider, cloth_on_cloth, near_the_least_gap,
-      a_correction_arrives_from_beyond_the_distance, a_cancelled_search_moves_nothing,
-      the_jacobian_has_the_predicted_forces, nan_is_forgotten, only_scenes_with_contact_have_it_checked,
-      scenes_without_contact_pay_nothing, all_bytes_are_counted, active_contacts_are_all_pairs,
-      queries_change_nothing)

@@ -17,8 +17,8 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
                            drape_step_info *info, drape_status *status)
 {
     const drape_entry_def term = {.type = "stretch.edge"};
-    drape_context *ctx = make_context();
-    drape_model *model = make_model(ctx, &(model_def){.mesh = MESH_SQUARE, .terms = &term, .term_count = 1});
+    scoped_context *ctx = make_context();
+    scoped_model *model = make_model(ctx, &(model_def){.mesh = MESH_SQUARE, .terms = &term, .term_count = 1});
     drape_arena arena = drape_arena_of(ctx);
     drape_state in, out;
     double scratch[2] = {0, 0};
@@ -42,12 +42,10 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
     if (verdict == DRAPE_ACCEPT && ops->own_steps)
         ck_assert(trial.h_next > 0);
     drape_arena_free(&arena);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
     return verdict;
 }
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_controllers[count]; count++) {
@@ -57,9 +55,8 @@ START_TEST(entries_are_well_formed)
     }
     ck_assert_int_eq(drape_registry_count(&drape_controller_registry), count);
 }
-END_TEST
 
-START_TEST(good_steps_are_accepted)
+TEST(good_steps_are_accepted)
 {
     for (int i = 0; drape_controllers[i]; i++) {
         double values[DRAPE_MAX_PARAMS];
@@ -74,9 +71,8 @@ START_TEST(good_steps_are_accepted)
         ck_assert_int_eq(status, DRAPE_RETRY_NONLINEAR);
     }
 }
-END_TEST
 
-START_TEST(failures_that_no_smaller_step_cures_keep_their_status)
+TEST(failures_that_no_smaller_step_cures_keep_their_status)
 {
     static const drape_status statuses[] = {DRAPE_E_SOLVER, DRAPE_E_MEMORY, DRAPE_E_ARGUMENT};
     for (int i = 0; drape_controllers[i]; i++)
@@ -89,10 +85,9 @@ START_TEST(failures_that_no_smaller_step_cures_keep_their_status)
             ck_assert_int_eq(status, statuses[k]);
         }
 }
-END_TEST
 
 /* An attempt that always fails is given up with a status that says so, at any time. */
-START_TEST(endless_failure_ends)
+TEST(endless_failure_ends)
 {
     static const double times[] = {0, 1e-300, 1, 1e9, -5};
     for (int i = 0; drape_controllers[i]; i++)
@@ -115,23 +110,21 @@ START_TEST(endless_failure_ends)
                 ck_assert_int_lt(status, 0);
             }
 }
-END_TEST
 
 static const drape_controller_ops *controller_named(const char *name)
 {
     return drape_controllers[drape_registry_find(&drape_controller_registry, NULL, name)];
 }
 
-START_TEST(fixed_never_halves)
+TEST(fixed_never_halves)
 {
     drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     drape_status status = DRAPE_RETRY_DEGENERATE;
     ck_assert_int_eq(judge(controller_named("fixed"), NULL, 0, 1, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_SOLVER);
 }
-END_TEST
 
-START_TEST(halving_stops_at_dt_min)
+TEST(halving_stops_at_dt_min)
 {
     drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     const double dt_min = 0.25;
@@ -140,9 +133,8 @@ START_TEST(halving_stops_at_dt_min)
     ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 3, 0.499, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
 }
-END_TEST
 
-START_TEST(halving_stops_where_the_time_stands_still)
+TEST(halving_stops_where_the_time_stands_still)
 {
     drape_step_info info = {.reason = DRAPE_REASON_MAX_ITERATIONS};
     const double dt_min = 1e-300;
@@ -150,8 +142,3 @@ START_TEST(halving_stops_where_the_time_stands_still)
     ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 1e6, 1e-11, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
 }
-END_TEST
-
-SUITE("controllers", entries_are_well_formed, good_steps_are_accepted,
-      failures_that_no_smaller_step_cures_keep_their_status, endless_failure_ends, fixed_never_halves,
-      halving_stops_at_dt_min, halving_stops_where_the_time_stands_still)

@@ -34,12 +34,10 @@ static hinge make_hinge(double rest_angle, const char *rest)
         {"young_modulus", 1e6, NULL}, {"thickness", 1e-3, NULL}, {"areal_density", 0.2, NULL}};
     const drape_setting setting = {"rest", 0, rest};
     const drape_entry_def term = {"bend.hinge", &setting, 1};
-    drape_scene_def scene;
-    drape_cloth_def cloth;
+    drape_scene_def scene = scene_def();
+    drape_cloth_def cloth = cloth_def();
     hinge h = {.ctx = make_context()};
     place_apex(x, rest_angle);
-    drape_scene_def_init(&scene, sizeof scene);
-    drape_cloth_def_init(&cloth, sizeof cloth);
     cloth.mesh.positions = x;
     cloth.mesh.triangles = triangles;
     cloth.mesh.node_count = 4;
@@ -51,8 +49,7 @@ static hinge make_hinge(double rest_angle, const char *rest)
     scene.cloths = &cloth;
     scene.cloth_count = 1;
     memset(scene.gravity, 0, sizeof scene.gravity);
-    ck_assert_msg(drape_model_create(h.ctx, &scene, &h.model) == DRAPE_OK, "%s",
-                  drape_context_message(h.ctx));
+    assert_ok(h.ctx, drape_model_create(h.ctx, &scene, &h.model));
     h.arena = drape_arena_create(h.ctx);
     h.system = make_system(h.arena, h.model, 1);
     ck_assert_int_eq(drape_state_create(h.arena, h.model, &h.before), DRAPE_OK);
@@ -108,17 +105,16 @@ static void check_fold(double rest, double sign, double turn)
     free_hinge(&h);
 }
 
-START_TEST(folds_through_pi_smoothly)
+TEST(folds_through_pi_smoothly)
 {
     check_fold(0, 1, 3 * pi);
     check_fold(0, -1, 3 * pi);
     check_fold(0.7, 1, 2.5 * pi);
     check_fold(0.7, -1, 2.5 * pi);
 }
-END_TEST
 
 /* A trial that is not accepted does not change the internal variable. */
-START_TEST(only_accepted_states_count)
+TEST(only_accepted_states_count)
 {
     hinge h = make_hinge(0, "mesh");
     double g[12], before = energy_at(&h, 0.5, g);
@@ -127,9 +123,8 @@ START_TEST(only_accepted_states_count)
     ck_assert_double_eq(energy_at(&h, 0.5, g), before);
     free_hinge(&h);
 }
-END_TEST
 
-START_TEST(rest_angles_of_the_mesh_or_flat)
+TEST(rest_angles_of_the_mesh_or_flat)
 {
     double g[12];
     for (double angle = -2.8; angle < 3; angle += 0.7) {
@@ -142,7 +137,6 @@ START_TEST(rest_angles_of_the_mesh_or_flat)
         free_hinge(&flat);
     }
 }
-END_TEST
 
 /* ---- Collapse ---- */
 
@@ -198,7 +192,7 @@ static void flatten(double *x, const int32_t *node, double share)
 
 /* Collapses the altitudes of every hinge in turn; the element reported has that altitude, or one that the
  * same move flattened more. */
-START_TEST(a_collapsed_altitude_is_reported)
+TEST(a_collapsed_altitude_is_reported)
 {
     sheet s = make_sheet("bend.hinge");
     const drape_elements *el = &s.model->terms[0].elements;
@@ -228,9 +222,8 @@ START_TEST(a_collapsed_altitude_is_reported)
     ck_assert_int_gt(own, el->count / 3);
     free_sheet(&s);
 }
-END_TEST
 
-START_TEST(a_collapsed_edge_is_reported)
+TEST(a_collapsed_edge_is_reported)
 {
     sheet s = make_sheet("stretch.edge");
     const drape_elements *el = &s.model->terms[0].elements;
@@ -257,7 +250,6 @@ START_TEST(a_collapsed_edge_is_reported)
     }
     free_sheet(&s);
 }
-END_TEST
 
 /* Steps of the first element from 1e-7 of its rest shape to a share of it. */
 static void check_below_limit(const char *term, void (*squeeze)(double *x, const int32_t *node, double share))
@@ -300,15 +292,14 @@ static void shorten(double *x, const int32_t *node, double share)
 
 /* If a value was below its limit before the step, it may stay or grow, so that a crumpled start can be
  * left; it must not fall. */
-START_TEST(what_was_degenerate_must_not_become_worse)
+TEST(what_was_degenerate_must_not_become_worse)
 {
     check_below_limit("stretch.edge", shorten);
     check_below_limit("bend.hinge", flatten);
 }
-END_TEST
 
 /* A fold by more than 2.8 in one step cannot be distinguished from one in the opposite direction. */
-START_TEST(a_turn_that_is_too_large_is_reported)
+TEST(a_turn_that_is_too_large_is_reported)
 {
     hinge h = make_hinge(0, "mesh");
     drape_reason reason = DRAPE_REASON_CONVERGED;
@@ -334,10 +325,9 @@ START_TEST(a_turn_that_is_too_large_is_reported)
         DRAPE_OK);
     free_hinge(&h);
 }
-END_TEST
 
 /* In a sim: a pinned corner is driven onto its neighbour, and the message names the element. */
-START_TEST(the_message_names_the_element)
+TEST(the_message_names_the_element)
 {
     static const drape_track_key track[] = {{0, {0, 0, 0}}, {1, {0.1, 0, 0}}}; /* node 0 to where node 1 is */
     static const int32_t zero = 0, one = 1;
@@ -345,15 +335,13 @@ START_TEST(the_message_names_the_element)
         {"young_modulus", 1e3, NULL}, {"thickness", 1e-3, NULL}, {"areal_density", 0.2, NULL}};
     const drape_setting grid[] = {{"edges", 2, NULL}, {"edge_length", 0.1, NULL}};
     const drape_entry_def term = {.type = "stretch.edge"};
-    drape_context *ctx = make_context();
-    drape_scene_def scene;
-    drape_cloth_def cloth;
+    scoped_context *ctx = make_context();
+    drape_scene_def scene = scene_def();
+    drape_cloth_def cloth = cloth_def();
     drape_pin_def pins[2];
-    drape_model *model = NULL;
-    drape_sim *sim = NULL;
+    scoped_model *model = NULL;
+    scoped_sim *sim = NULL;
     int64_t count = 0;
-    drape_scene_def_init(&scene, sizeof scene);
-    drape_cloth_def_init(&cloth, sizeof cloth);
     for (int i = 0; i < 2; i++) {
         drape_pin_def_init(&pins[i], sizeof pins[i]);
         pins[i].nodes = i ? &one : &zero;
@@ -371,7 +359,7 @@ START_TEST(the_message_names_the_element)
     cloth.pin_count = 2;
     scene.cloths = &cloth;
     scene.cloth_count = 1;
-    ck_assert_msg(drape_model_create(ctx, &scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, drape_model_create(ctx, &scene, &model));
     ck_assert_int_eq(drape_sim_create(ctx, model, NULL, &sim), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(sim, 2), DRAPE_E_STEP_TOO_SMALL);
     const char *message = drape_context_message(ctx);
@@ -381,13 +369,4 @@ START_TEST(the_message_names_the_element)
     ck_assert_str_eq(drape_sim_reason(sim, 0, &count), "edge_collapse");
     ck_assert_int_eq(count, drape_sim_statistics(sim).steps_rejected);
     ck_assert_double_lt(drape_sim_time(sim), 1);
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("hinge", folds_through_pi_smoothly, only_accepted_states_count, rest_angles_of_the_mesh_or_flat,
-      a_collapsed_altitude_is_reported, a_collapsed_edge_is_reported,
-      what_was_degenerate_must_not_become_worse, a_turn_that_is_too_large_is_reported,
-      the_message_names_the_element)

@@ -163,9 +163,7 @@ static const char *with_quotes(const char *text)
     static char quoted[2048];
     ck_assert_uint_lt(strlen(text), sizeof quoted);
     strcpy(quoted, text);
-    for (char *c = quoted; *c; c++)
-        if (*c == '\'')
-            *c = '"';
+    quote(quoted);
     return quoted;
 }
 
@@ -301,7 +299,7 @@ static void try_settings(trial *t, const drape_registry *registry, const char *p
     }
 }
 
-START_TEST(every_key_that_affects_results_is_in_the_identity)
+TEST(every_key_that_affects_results_is_in_the_identity)
 {
     trial t = {0};
     scene s = open_changed(NULL, NULL);
@@ -318,6 +316,3 @@ START_TEST(every_key_that_affects_results_is_in_the_identity)
     ck_assert_int_gt(t.count, (int)(sizeof cases / sizeof *cases) / 2); /* keys without a case */
     free(t.saved.data);
 }
-END_TEST
-
-SUITE("identity", every_key_that_affects_results_is_in_the_identity)

@@ -13,7 +13,7 @@ static int param_of(const drape_integrator_ops *ops, const char *name)
     return drape_param_find(ops->entry.params, ops->entry.param_count, name);
 }
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_integrators[count]; count++) {
@@ -26,10 +26,9 @@ START_TEST(entries_are_well_formed)
     }
     ck_assert_int_eq(drape_registry_count(&drape_integrator_registry), count);
 }
-END_TEST
 
 /* Tests of hosts, which know names only, run all that have steps in time. */
-START_TEST(hosts_have_all_methods)
+TEST(hosts_have_all_methods)
 {
     int count = 0;
     for (int i = 0; drape_integrators[i]; i++) {
@@ -41,10 +40,9 @@ START_TEST(hosts_have_all_methods)
     }
     ck_assert_int_eq(count, METHODS);
 }
-END_TEST
 
 /* Every integrator accepts the keys of the others, so a name has the same kind and unit in all of them. */
-START_TEST(shared_names_mean_the_same)
+TEST(shared_names_mean_the_same)
 {
     for (int i = 0; drape_integrators[i]; i++)
         for (int j = 0; j < i; j++)
@@ -57,7 +55,6 @@ START_TEST(shared_names_mean_the_same)
                 ck_assert_str_eq(one->unit, drape_integrators[j]->entry.params[q].unit);
             }
 }
-END_TEST
 
 /* ---- One step ---- */
 
@@ -87,8 +84,7 @@ static stepper open_stepper(const drape_integrator_ops *ops, const double *value
         &(model_def){.mesh = MESH_CURVED, .terms = terms, .term_count = 4, .gravity = true, .pinned = true});
     s.arena = drape_arena_create(s.ctx);
     s.system = make_system(s.arena, s.model, 1);
-    ck_assert_msg(ops->create(s.arena, s.system, values, &s.state) == DRAPE_OK, "%s",
-                  drape_context_message(s.ctx));
+    assert_ok(s.ctx, ops->create(s.arena, s.system, values, &s.state));
     s.n = 3 * (size_t)s.model->node_count;
     ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.in), DRAPE_OK);
     ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.out), DRAPE_OK);
@@ -105,6 +101,8 @@ static void close_stepper(stepper *s)
     drape_model_destroy(&s->model);
     drape_context_destroy(&s->ctx);
 }
+
+#define scoped_stepper SCOPED(close_stepper) stepper
 
 static void copy_state(const stepper *s, const drape_state *from, drape_state *to)
 {
@@ -177,7 +175,7 @@ static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const d
  * are inexact; there both results are within the tolerance. */
 static void check_steps(const drape_integrator_ops *ops, const double *values, const char *what)
 {
-    stepper s = open_stepper(ops, values);
+    scoped_stepper s = open_stepper(ops, values);
     drape_state first;
     bool modified = strcmp(what, "newton modified") == 0;
     ck_assert_int_eq(drape_state_create(s.arena, s.model, &first), DRAPE_OK);
@@ -205,19 +203,17 @@ static void check_steps(const drape_integrator_ops *ops, const double *values, c
         drape_state_commit(s.model, &s.in, &s.out);
         copy_state(&s, &s.out, &s.in);
     }
-    close_stepper(&s);
 }
 
-START_TEST(steps_do_not_write_their_input_and_repeat)
+TEST(steps_do_not_write_their_input_and_repeat)
 {
     for_all_choices(check_steps);
 }
-END_TEST
 
 /* Two new integrators on the same path have the same bits without a restart. */
 static void check_twins(const drape_integrator_ops *ops, const double *values, const char *what)
 {
-    stepper a = open_stepper(ops, values), b = open_stepper(ops, values);
+    scoped_stepper a = open_stepper(ops, values), b = open_stepper(ops, values);
     for (int k = 0; k < 10; k++) {
         drape_step_info one, other;
         ck_assert_int_eq(take_step(&a, 0.01, &one), DRAPE_OK);
@@ -230,15 +226,12 @@ static void check_twins(const drape_integrator_ops *ops, const double *values, c
         copy_state(&a, &a.out, &a.in);
         copy_state(&b, &b.out, &b.in);
     }
-    close_stepper(&a);
-    close_stepper(&b);
 }
 
-START_TEST(equal_runs_have_equal_bits)
+TEST(equal_runs_have_equal_bits)
 {
     for_all_choices(check_twins);
 }
-END_TEST
 
 /* ---- What a step reports ---- */
 
@@ -269,7 +262,7 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
 {
     if (strcmp(ops->entry.name, "be") != 0)
         return;
-    stepper s = open_stepper(ops, values);
+    scoped_stepper s = open_stepper(ops, values);
     double *history = drape_arena_take(s.arena, (size_t)s.model->measure_count, sizeof *history);
     double *g = drape_arena_take(s.arena, s.n, sizeof *g);
     for (int k = 0; k < 30; k++) {
@@ -291,18 +284,16 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
         drape_state_commit(s.model, &s.in, &s.out);
         copy_state(&s, &s.out, &s.in);
     }
-    close_stepper(&s);
 }
 
-START_TEST(a_converged_step_is_converged)
+TEST(a_converged_step_is_converged)
 {
     for_all_choices(check_residual);
 }
-END_TEST
 
 /* One iteration is not enough for a sheet that is released: the step fails, or is accepted and reported as
  * not converged. */
-START_TEST(a_step_that_has_not_converged_is_reported)
+TEST(a_step_that_has_not_converged_is_reported)
 {
     for (int i = 0; drape_integrators[i]; i++)
         for (int accept = 0; accept < 2; accept++) {
@@ -314,7 +305,7 @@ START_TEST(a_step_that_has_not_converged_is_reported)
             defaults(ops, values);
             values[max_iterations] = 1;
             values[on_failure] = accept;
-            stepper s = open_stepper(ops, values);
+            scoped_stepper s = open_stepper(ops, values);
             drape_step_info info;
             ck_assert_int_eq(take_step(&s, 0.05, &info), DRAPE_RETRY_NONLINEAR);
             ck_assert_int_eq(info.reason, DRAPE_REASON_MAX_ITERATIONS);
@@ -324,10 +315,8 @@ START_TEST(a_step_that_has_not_converged_is_reported)
             ck_assert_double_eq(info.diagnostic.value, info.residual);
             ck_assert_double_eq(info.diagnostic.limit, info.tolerance);
             ck_assert(info.diagnostic.node[0] >= 0 && !s.model->pinned[info.diagnostic.node[0]]);
-            close_stepper(&s);
         }
 }
-END_TEST
 
 /* ---- Sims
  * ----------------------------------------------------------------------------------------------------------
@@ -343,16 +332,15 @@ static double fall_tolerance(const drape_integrator_ops *ops, double h, double t
     return ops->order == 1 ? 9.81 * h * t / 2 * (1 + 1e-9) : 9.81 * h * h;
 }
 
-START_TEST(a_triangle_falls_freely)
+TEST(a_triangle_falls_freely)
 {
     static const double x[] = {0.1, 0.2, 0.3, 0.4, 0.2, 0.3, 0.2, 0.2, 0.7};
     static const int32_t triangle[] = {0, 1, 2};
     const drape_setting material[] = {
         {"young_modulus", 1e3, NULL}, {"thickness", 1e-3, NULL}, {"areal_density", 0.2, NULL}};
     const drape_entry_def terms[] = {{.type = "stretch.edge"}, {.type = "bend.hinge"}};
-    drape_scene_def scene;
+    drape_scene_def scene = scene_def();
     drape_cloth_def cloth = {.name = NULL};
-    drape_scene_def_init(&scene, sizeof scene);
     drape_cloth_def_init(&cloth, sizeof cloth);
     cloth.mesh.positions = x;
     cloth.mesh.triangles = triangle;
@@ -369,12 +357,11 @@ START_TEST(a_triangle_falls_freely)
         if (drape_integrators[i]->steady_state)
             continue;
         const double h = 0.01, t = 0.5;
-        drape_context *ctx = make_context();
-        drape_model *model = NULL;
-        drape_sim *sim = NULL;
-        drape_sim_def def;
-        ck_assert_msg(drape_model_create(ctx, &scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
-        drape_sim_def_init(&def, sizeof def);
+        scoped_context *ctx = make_context();
+        scoped_model *model = NULL;
+        scoped_sim *sim = NULL;
+        drape_sim_def def = sim_def();
+        assert_ok(ctx, drape_model_create(ctx, &scene, &model));
         def.integrator = drape_integrators[i]->entry.name;
         def.dt = drape_integrators[i]->own_steps ? 0 : h;
         ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
@@ -385,13 +372,5 @@ START_TEST(a_triangle_falls_freely)
             double tolerance = k % 3 == 1 ? fall_tolerance(drape_integrators[i], h, t) : 1e-9;
             ck_assert_double_eq_tol(drape_sim_positions(sim)[k], exact, tolerance);
         }
-        drape_sim_destroy(&sim);
-        drape_model_destroy(&model);
-        drape_context_destroy(&ctx);
     }
 }
-END_TEST
-
-SUITE("integrators", entries_are_well_formed, hosts_have_all_methods, shared_names_mean_the_same,
-      steps_do_not_write_their_input_and_repeat, equal_runs_have_equal_bits, a_converged_step_is_converged,
-      a_step_that_has_not_converged_is_reported, a_triangle_falls_freely)

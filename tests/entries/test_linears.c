@@ -64,6 +64,8 @@ static void close_problem(problem *q)
     drape_context_destroy(&q->ctx);
 }
 
+#define scoped_problem SCOPED(close_problem) problem
+
 typedef enum matrix_kind { SPD, INDEFINITE, UNSYMMETRIC, TINY, HUGE_ENTRIES, KIND_COUNT } matrix_kind;
 
 /* Random entries; the diagonal dominates if the matrix is to be positive definite. */
@@ -144,7 +146,7 @@ static void check_solution(problem *q, const drape_linear_ops *ops, void *solver
 static void *open_solver(problem *q, const drape_linear_ops *ops)
 {
     void *solver = NULL;
-    ck_assert_msg(ops->create(q->arena, q->p, &solver) == DRAPE_OK, "%s", drape_context_message(q->ctx));
+    assert_ok(q->ctx, ops->create(q->arena, q->p, &solver));
     ck_assert_ptr_nonnull(solver);
     return solver;
 }
@@ -172,7 +174,7 @@ static const drape_linear_ops *multifrontal(void)
 
 /* ---- Tests ---- */
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_linears[count]; count++) {
@@ -184,12 +186,11 @@ START_TEST(entries_are_well_formed)
     ck_assert_ptr_null(drape_linears_names[count]);
     ck_assert_int_eq(drape_registry_count(&drape_linear_registry), count);
 }
-END_TEST
 
-START_TEST(random_systems_are_solved)
+TEST(random_systems_are_solved)
 {
     static const char *const names[] = {"positive definite", "indefinite", "unsymmetric", "tiny", "huge"};
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         void *solver = open_solver(&q, drape_linears[i]);
         for (uint64_t seed = 1; seed <= 20;
@@ -203,9 +204,7 @@ START_TEST(random_systems_are_solved)
         ck_assert_ptr_null(solver);
         drape_linear_destroy(drape_linears[i], &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 static void clear_column(problem *q, int64_t c)
 {
@@ -256,9 +255,9 @@ static void break_matrix(problem *q, int how)
 enum { BREAKS = 8 };
 
 /* Once as the first matrix, for which pivots are chosen, and once as a later one, for which they are kept. */
-START_TEST(broken_matrices_are_reported_and_good_ones_work_again)
+TEST(broken_matrices_are_reported_and_good_ones_work_again)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++)
         for (int how = 0; how < BREAKS; how++)
             for (int later = 0; later < 2; later++) {
@@ -280,13 +279,11 @@ START_TEST(broken_matrices_are_reported_and_good_ones_work_again)
                 }
                 drape_linear_destroy(ops, &solver);
             }
-    close_problem(&q);
 }
-END_TEST
 
-START_TEST(a_right_hand_side_that_is_not_finite_is_reported)
+TEST(a_right_hand_side_that_is_not_finite_is_reported)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         void *solver = open_solver(&q, drape_linears[i]);
         fill(&q, SPD, 2);
@@ -297,15 +294,13 @@ START_TEST(a_right_hand_side_that_is_not_finite_is_reported)
         check_solution(&q, drape_linears[i], solver, "after");
         drape_linear_destroy(drape_linears[i], &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 /* The pivots that were chosen for the first matrix are zero in the second, which is regular: its pivots are
  * off the diagonal of each node's block. */
-START_TEST(kept_pivots_that_become_zero_are_chosen_again)
+TEST(kept_pivots_that_become_zero_are_chosen_again)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         void *solver = open_solver(&q, drape_linears[i]);
         fill(&q, SPD, 4);
@@ -319,16 +314,14 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
         check_solution(&q, drape_linears[i], solver, "other pivots");
         drape_linear_destroy(drape_linears[i], &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 /* The 3 x 3 block of a node is symmetric in the pattern of every mesh, so a difference there is the
  * smallest that a solver can overlook. Taking one triangle for both gives an error of about the
  * difference. */
-START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
+TEST(a_small_part_that_is_not_symmetric_is_not_lost)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         void *solver = open_solver(&q, drape_linears[i]);
         for (int upper = 0; upper < 2; upper++)
@@ -342,9 +335,7 @@ START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
             }
         drape_linear_destroy(drape_linears[i], &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 /* Whether the solver passes matrices that are not positive definite to another solver. */
 static bool falls_back(const drape_linear_ops *ops)
@@ -359,9 +350,9 @@ static bool takes_more(const drape_linear_ops *ops)
 }
 
 /* Such solvers pass on all matrices that are not positive definite, and only these. */
-START_TEST(fallbacks_are_counted)
+TEST(fallbacks_are_counted)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         const drape_linear_ops *ops = drape_linears[i];
         void *solver = open_solver(&q, ops);
@@ -379,15 +370,13 @@ START_TEST(fallbacks_are_counted)
         ck_assert_int_eq(counts[UNSYMMETRIC], falls);
         drape_linear_destroy(ops, &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 /* An indefinite matrix is refused if a definite one is asked for, at the latest when it is solved with; no
  * other solver is needed then. */
-START_TEST(iterative_solvers_refuse_indefinite_matrices_if_asked)
+TEST(iterative_solvers_refuse_indefinite_matrices_if_asked)
 {
-    problem q = open_problem();
+    scoped_problem q = open_problem();
     for (int i = FIRST; drape_linears[i]; i++) {
         const drape_linear_ops *ops = drape_linears[i];
         if (!falls_back(ops))
@@ -404,9 +393,7 @@ START_TEST(iterative_solvers_refuse_indefinite_matrices_if_asked)
         ck_assert_int_eq(report_of(ops, solver).fallbacks, 0);
         drape_linear_destroy(ops, &solver);
     }
-    close_problem(&q);
 }
-END_TEST
 
 /* ---- A sheet of many supernodes ---- */
 
@@ -452,6 +439,8 @@ static void close_sheet(sheet *q)
     drape_arena_destroy(&q->arena);
     drape_context_destroy(&q->ctx);
 }
+
+#define scoped_sheet SCOPED(close_sheet) sheet
 
 /* Symmetric and random. With shift 1 the diagonal dominates weakly; the smaller shift, the more
  * indefinite. */
@@ -516,12 +505,12 @@ static void check_fallback(const drape_linear_ops *ops, const drape_linear_repor
 
 /* Definite and indefinite matrices in turn; a second solver with the same input gives the same bits. A dense
  * matrix has no supernodes, and takes n^3: a small sheet does for it. */
-START_TEST(a_sheet_of_many_supernodes)
+TEST(a_sheet_of_many_supernodes)
 {
     static const double shifts[] = {1.01, 0.15, 1.5, 0.2, 1.01};
     for (int i = FIRST; drape_linears[i]; i++) {
         const drape_linear_ops *ops = drape_linears[i];
-        sheet q = open_sheet(strcmp(ops->entry.name, "dense") == 0 ? 8 : 24);
+        scoped_sheet q = open_sheet(strcmp(ops->entry.name, "dense") == 0 ? 8 : 24);
         void *solver = NULL, *other = NULL;
         ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
         ck_assert_int_eq(ops->create(q.arena, &q.p, &other), DRAPE_OK);
@@ -538,20 +527,18 @@ START_TEST(a_sheet_of_many_supernodes)
         check_fallback(ops, &report, 2);
         drape_linear_destroy(ops, &solver);
         drape_linear_destroy(ops, &other);
-        close_sheet(&q);
     }
 }
-END_TEST
 
 /* Ordered by minimum degree and, if METIS is built in, by nested dissection; with several branches for the
  * threads and fronts that they share. */
-START_TEST(threads_give_the_same_bits)
+TEST(threads_give_the_same_bits)
 {
     static const int32_t sides[] = {24, 40};
     for (int i = FIRST; drape_linears[i]; i++)
         for (size_t k = 0; drape_linears[i]->use_threads && k < sizeof sides / sizeof *sides; k++) {
             const drape_linear_ops *ops = drape_linears[i];
-            sheet q = open_sheet(sides[k]);
+            scoped_sheet q = open_sheet(sides[k]);
             void *solver = NULL;
             ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
             fill_sheet(&q, 1.01, 7);
@@ -568,14 +555,12 @@ START_TEST(threads_give_the_same_bits)
             }
             check_residual(&q, true, ops->entry.name);
             drape_linear_destroy(ops, &solver);
-            close_sheet(&q);
         }
 }
-END_TEST
 
 /* What only other matrices need is taken when it is needed: definite matrices do not pay for it. If there is
  * no memory for it then, the solver reports that, has no factors, and succeeds when it is called again. */
-START_TEST(no_memory_for_other_matrices)
+TEST(no_memory_for_other_matrices)
 {
     static const int32_t sides[] = {8, 24};
     for (int i = FIRST; drape_linears[i]; i++)
@@ -617,17 +602,16 @@ START_TEST(no_memory_for_other_matrices)
             ck_assert_int_eq(memory.live, 0);
         }
 }
-END_TEST
 
 /* The solver with the largest best_from that is not above the size; klu below all others. */
-START_TEST(auto_chooses_by_size_and_reports_it)
+TEST(auto_chooses_by_size_and_reports_it)
 {
     static const int32_t sides[] = {3, 30};
     const drape_linear_ops *chooser = drape_linears[0];
     ck_assert_str_eq(chooser->entry.name, "auto");
     ck_assert_int_eq(chooser->best_from, 0);
     for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
-        sheet q = open_sheet(sides[k]);
+        scoped_sheet q = open_sheet(sides[k]);
         char why[DRAPE_LINEAR_WHY] = "";
         const drape_linear_ops *expected = NULL, *found = drape_linear_of(NULL, 0, q.p.n);
         for (int i = FIRST; drape_linears[i]; i++)
@@ -640,10 +624,8 @@ START_TEST(auto_chooses_by_size_and_reports_it)
         ck_assert_str_ne(why, "");
         if (k == 0)
             ck_assert_str_eq(found->entry.name, "klu");
-        close_sheet(&q);
     }
 }
-END_TEST
 
 /* ---- Matrices that are not positive definite ---- */
 
@@ -694,10 +676,10 @@ static void fill_laplacian(sheet *q, double shift)
 /* The Laplacian itself is singular: it is refused, or, if rounding errors hide that, gets a solution within
  * the bound. A shift of -1e-11 moves its three eigenvalues 0 to about -1e-11 of the largest; a larger one
  * makes more of them negative. */
-START_TEST(a_singular_matrix_is_refused_and_a_nearly_singular_one_solved)
+TEST(a_singular_matrix_is_refused_and_a_nearly_singular_one_solved)
 {
     const drape_linear_ops *ops = multifrontal();
-    sheet q = open_sheet(16);
+    scoped_sheet q = open_sheet(16);
     void *solver = NULL;
     ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
     for (int64_t i = 0; i < q.p.n; i++)
@@ -714,16 +696,14 @@ START_TEST(a_singular_matrix_is_refused_and_a_nearly_singular_one_solved)
         ck_assert_double_lt(backward_error(&q), 1e-10);
     }
     drape_linear_destroy(ops, &solver);
-    close_sheet(&q);
 }
-END_TEST
 
 /* Gershgorin's circles of a matrix whose diagonal dominates do not contain 0, so there is a negative
  * eigenvalue for each negative number on the diagonal. Of the Laplacian, lowered by less than its second
  * eigenvalue, three are. */
-START_TEST(negative_eigenvalues_are_counted)
+TEST(negative_eigenvalues_are_counted)
 {
-    sheet q = open_sheet(20);
+    scoped_sheet q = open_sheet(20);
     int64_t negative = -1, expected = 0;
     bool known = false;
     for (int64_t c = 0; c < q.p.n; c++)
@@ -746,16 +726,14 @@ START_TEST(negative_eigenvalues_are_counted)
     q.values[0] = NAN;
     ck_assert_int_eq(drape_inertia(q.ctx, &q.p, q.values, NULL, &negative, &known), DRAPE_OK);
     ck_assert(!known);
-    close_sheet(&q);
 }
-END_TEST
 
 /* A raised flag ends a factorisation of each class; lowered, the next one succeeds. */
-START_TEST(a_factorisation_can_be_cancelled)
+TEST(a_factorisation_can_be_cancelled)
 {
     static const hard_kind kinds[] = {NEGATIVE, CONVECTED};
     const drape_linear_ops *ops = multifrontal();
-    sheet q = open_sheet(20);
+    scoped_sheet q = open_sheet(20);
     atomic_bool flag = true;
     const atomic_bool *place = NULL;
     void *solver = NULL;
@@ -774,27 +752,24 @@ START_TEST(a_factorisation_can_be_cancelled)
         ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
     }
     drape_linear_destroy(ops, &solver);
-    close_sheet(&q);
 }
-END_TEST
 
 /* For fewer unknowns than any solver is the fastest for, the one for the smallest size. */
-START_TEST(the_best_solver_of_no_unknowns)
+TEST(the_best_solver_of_no_unknowns)
 {
     ck_assert_str_eq(drape_linear_best(0)->entry.name, "klu");
     ck_assert_str_eq(drape_linear_best(1)->entry.name, "klu");
     ck_assert_str_eq(drape_linear_best(1000)->entry.name, "multifrontal");
 }
-END_TEST
 
 /* A + B with B' = -B has A as its symmetric part and B as its antisymmetric one, up to the rounding of the
  * sum; A itself keeps its bits. */
-START_TEST(the_symmetric_part_is_exact)
+TEST(the_symmetric_part_is_exact)
 {
-    sheet q = open_sheet(8);
+    scoped_sheet q = open_sheet(8);
     fill_sheet(&q, 1, 7);
-    double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric),
-           *rest = take((size_t)q.p.nonzeros, sizeof *rest);
+    scoped_memory double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric),
+                         *rest = take((size_t)q.p.nonzeros, sizeof *rest);
     memcpy(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric);
     drape_pattern_symmetrize(&q.p, q.values);
     ck_assert(memcmp(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric) == 0);
@@ -813,11 +788,7 @@ START_TEST(the_symmetric_part_is_exact)
     drape_pattern_symmetrize(&q.p, q.values);
     for (int64_t k = 0; k < q.p.nonzeros; k++)
         ck_assert_double_eq_tol(q.values[k], symmetric[k], 2 * DBL_EPSILON * (fabs(symmetric[k]) + 1));
-    free(rest);
-    free(symmetric);
-    close_sheet(&q);
 }
-END_TEST
 
 /* The factors of a solver as a preconditioner. */
 typedef struct factored {
@@ -853,10 +824,11 @@ static double residual_of(problem *q)
  * the random symmetric part are dominated by the diagonal, so S is positive definite with condition numbers
  * of about 1e3; one entry in each of three columns is changed, a change of rank 3, so four
  * iterations end at rounding errors: 1e-10 is far above them. At 1e-2 the solution of S alone misses. */
-START_TEST(a_nearby_matrix_is_corrected)
+TEST(a_nearby_matrix_is_corrected)
 {
-    problem q = open_problem();
-    double *symmetric = take((size_t)q.p->nonzeros, sizeof *symmetric), *zero = take(q.n, sizeof *zero);
+    scoped_problem q = open_problem();
+    scoped_memory double *symmetric = take((size_t)q.p->nonzeros, sizeof *symmetric),
+                         *zero = take(q.n, sizeof *zero);
     drape_refine work;
     ck_assert(drape_refine_create(q.arena, q.p, &work) == DRAPE_OK);
     for (int i = FIRST; drape_linears[i]; i++) {
@@ -879,11 +851,7 @@ START_TEST(a_nearby_matrix_is_corrected)
         ck_assert_double_le(euclidean(q.n, q.x, q.expected), 1e-6 * euclidean(q.n, q.expected, zero));
         drape_linear_destroy(f.ops, &f.solver);
     }
-    free(symmetric);
-    free(zero);
-    close_problem(&q);
 }
-END_TEST
 
 /* ---- Orders ---- */
 
@@ -896,7 +864,7 @@ static drape_model *small_model(drape_context *ctx, bool pinned)
 
 /* Solvers with equal patterns share one order, also after the pattern that it was found for is gone; it goes
  * with the last of them. Failed allocations leave nothing. */
-START_TEST(equal_patterns_share_an_order)
+TEST(equal_patterns_share_an_order)
 {
     failing_allocator memory = {0};
     drape_context *ctx = failing_context(&memory);
@@ -937,13 +905,3 @@ START_TEST(equal_patterns_share_an_order)
     drape_context_destroy(&ctx);
     ck_assert_int_eq(memory.live, 0);
 }
-END_TEST
-
-SUITE("linears", entries_are_well_formed, equal_patterns_share_an_order, random_systems_are_solved,
-      broken_matrices_are_reported_and_good_ones_work_again, a_right_hand_side_that_is_not_finite_is_reported,
-      kept_pivots_that_become_zero_are_chosen_again, a_small_part_that_is_not_symmetric_is_not_lost,
-      fallbacks_are_counted, iterative_solvers_refuse_indefinite_matrices_if_asked,
-      a_sheet_of_many_supernodes, threads_give_the_same_bits, no_memory_for_other_matrices,
-      a_singular_matrix_is_refused_and_a_nearly_singular_one_solved, negative_eigenvalues_are_counted,
-      a_factorisation_can_be_cancelled, the_best_solver_of_no_unknowns, auto_chooses_by_size_and_reports_it,
-      the_symmetric_part_is_exact, a_nearby_matrix_is_corrected)

@@ -67,36 +67,33 @@ static void check_energies(const drape_model *m, const double *x, const double l
     ck_assert_int_ge(whole, 4);
 }
 
-START_TEST(quadratics_are_exact)
+TEST(quadratics_are_exact)
 {
     static const double bends[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.613, -0.241, 0.377}};
     static const drape_setting woven[] = {
         {"warp", 3e-4, NULL}, {"weft", 1e-4, NULL}, {"twist", 0.7e-4, NULL}, {"poisson", 0.2, NULL}};
     const double c11 = 3e-4 / 0.96, c22 = 1e-4 / 0.96;
     const double law[4] = {c11, c22, 0.2 * sqrt(c11 * c22), 0.7e-4};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     double x[3 * 64];
     for (int mesh = 0; mesh < MESH_CURVED; mesh++)
         for (size_t k = 0; k < sizeof bends / sizeof *bends; k++) {
-            drape_model *m = sheet(ctx, woven, 4, (enum model_mesh)mesh);
+            scoped_model *m = sheet(ctx, woven, 4, (enum model_mesh)mesh);
             ck_assert_int_le(m->node_count, 64);
             deflect(m, bends[k], x);
             check_energies(m, x, law, bends[k]);
-            drape_model_destroy(&m);
         }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Forces and matrix are summed over hinges and patches of squares. They equal the sums over squares, each by
  * itself, of f dq and of f ddq + (k + w c) dq dq'; and have the same bits for any number of threads. */
-START_TEST(sums_over_hinges_equal_sums_over_squares)
+TEST(sums_over_hinges_equal_sums_over_squares)
 {
     static const drape_setting damping[] = {{"beta", 0.01, NULL}};
     const drape_entry_def terms[] = {{"bend.midedge", NULL, 0}, {"damp.kelvin_voigt", damping, 1}};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
-        drape_model *m = make_model(
+        scoped_model *m = make_model(
             ctx,
             &(model_def){.mesh = (enum model_mesh)mesh, .terms = terms, .term_count = 2, .pinned = true});
         const drape_elements *el = &m->terms[0].elements;
@@ -167,10 +164,5 @@ START_TEST(sums_over_hinges_equal_sums_over_squares)
         for (size_t i = 0; i < nonzeros; i++)
             ck_assert_double_eq_tol(h[i], matrix[i], 1e-13 * stiffness);
         drape_arena_free(&memory);
-        drape_model_destroy(&m);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("midedge", quadratics_are_exact, sums_over_hinges_equal_sums_over_squares)

@@ -29,15 +29,15 @@ static void mark_boundary(const drape_model *m, int32_t *marked)
 
 /* A uniform stretching with shear, rotated out of the plane of rest: every measure is l . e, so the energy is
  * that of stretch.cst, and so are all forces, which vanish inside. */
-START_TEST(uniform_strain_is_exact)
+TEST(uniform_strain_is_exact)
 {
     static const double f[6] = {1.1, 0.07, -0.04, 0.93, 0.3, -0.2}; /* of x and z */
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (int mesh = 0; mesh < MESH_CURVED; mesh++) {
         double g[2][3 * 64] = {{0}}, energy[2] = {0}, largest = 0, inside = 0;
         int32_t boundary[64];
         for (int k = 0; k < 2; k++) {
-            drape_model *m = sheet(ctx, k ? "stretch.cst" : "stretch.patch", (enum model_mesh)mesh);
+            scoped_model *m = sheet(ctx, k ? "stretch.cst" : "stretch.patch", (enum model_mesh)mesh);
             const drape_elements *el = &m->terms[0].elements;
             double x[3 * 64];
             ck_assert_int_le(m->node_count, 64);
@@ -57,7 +57,6 @@ START_TEST(uniform_strain_is_exact)
                 double *max = boundary[i / 3] ? &largest : &inside;
                 *max = fmax(*max, fabs(g[0][i]));
             }
-            drape_model_destroy(&m);
         }
         /* Rounding: the coefficients of second derivatives are up to some 10. */
         ck_assert_double_eq_tol(energy[0] / energy[1], 1, 1e-12);
@@ -65,9 +64,7 @@ START_TEST(uniform_strain_is_exact)
         for (int i = 0; i < 3 * 64; i++)
             ck_assert_double_eq_tol(g[0][i], g[1][i], 1e-12 * largest);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* The in-plane part of the Hessian at rest, sum k dq dq' (n x n, n = 2 node_count). */
 static void plane_hessian(const drape_model *m, double *h)
@@ -97,22 +94,21 @@ static int ascending(const void *a, const void *b)
 /* Means of strains are softer than strains, but every mode that is not rigid keeps a good part of its
  * stiffness: from the same place in the order of eigenvalues, at least a twentieth. One that would be free of
  * energy if it were not for the boundary would keep less the larger the mesh. */
-START_TEST(only_rigid_motions_are_free)
+TEST(only_rigid_motions_are_free)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (int mesh = 0; mesh < MESH_CURVED; mesh++) {
         double lowest[2][128];
         int n = 0;
         for (int k = 0; k < 2; k++) {
             static double h[128 * 128], v[128 * 128];
-            drape_model *m = sheet(ctx, k ? "stretch.cst" : "stretch.patch", (enum model_mesh)mesh);
+            scoped_model *m = sheet(ctx, k ? "stretch.cst" : "stretch.patch", (enum model_mesh)mesh);
             n = 2 * m->node_count;
             plane_hessian(m, h);
             drape_diagonalise(n, h, v);
             for (int i = 0; i < n; i++)
                 lowest[k][i] = h[(n + 1) * i];
             qsort(lowest[k], (size_t)n, sizeof(double), ascending);
-            drape_model_destroy(&m);
         }
         for (int i = 0; i < n; i++) {
             if (i < 3)
@@ -121,9 +117,7 @@ START_TEST(only_rigid_motions_are_free)
                 ck_assert_double_ge(lowest[0][i], lowest[1][i] / 20);
         }
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* The largest |q - q0| on a sheet that is rolled up obliquely on a cylinder. */
 static double rolled_strain(const drape_model *m, double curvature)
@@ -147,27 +141,23 @@ static double rolled_strain(const drape_model *m, double curvature)
 }
 
 /* Edges of 0.1 m: 0.05 and 0.1 of the radius. */
-START_TEST(isometric_bending_has_no_strain_of_second_order)
+TEST(isometric_bending_has_no_strain_of_second_order)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (int mesh = 0; mesh < MESH_CURVED; mesh++) {
-        drape_model *cst = sheet(ctx, "stretch.cst", (enum model_mesh)mesh),
-                    *patch = sheet(ctx, "stretch.patch", (enum model_mesh)mesh);
+        scoped_model *cst = sheet(ctx, "stretch.cst", (enum model_mesh)mesh),
+                     *patch = sheet(ctx, "stretch.patch", (enum model_mesh)mesh);
         ck_assert_int_le(cst->node_count, 64);
         /* The ratio of orders two and four; the next order adds some (curvature edge)^2 of it. */
         ck_assert_double_eq_tol(rolled_strain(cst, 1) / rolled_strain(cst, 0.5), 4, 0.1);
         ck_assert_double_eq_tol(rolled_strain(patch, 1) / rolled_strain(patch, 0.5), 16, 0.8);
         ck_assert_double_le(rolled_strain(patch, 1), 0.01 * rolled_strain(cst, 1));
-        drape_model_destroy(&cst);
-        drape_model_destroy(&patch);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* One triangle, two, a strip of one cell, a tetrahedron, on which all neighbours have the same apex, and a
  * pyramid: at rest without force, with exact derivatives. */
-START_TEST(small_meshes)
+TEST(small_meshes)
 {
     static const double x[] = {0, 0, 0, 1, 0, 0, 0.4, 0, -0.9, 1.3, 0, -1, 0.5, 0.8, -0.3};
     static const struct {
@@ -178,19 +168,17 @@ START_TEST(small_meshes)
                   {5, 3, {0, 1, 2, 1, 3, 2, 1, 4, 3}},
                   {4, 4, {0, 1, 2, 0, 3, 1, 1, 3, 2, 2, 3, 0}},
                   {5, 4, {0, 1, 4, 1, 3, 4, 3, 2, 4, 2, 0, 4}}};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (size_t k = 0; k < sizeof meshes / sizeof *meshes; k++) {
         const drape_setting material[] = {
             {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"areal_density", 0.2, NULL}};
         const drape_entry_def term = {"stretch.patch", NULL, 0};
         const double tetrahedron[] = {0, 0, 0, 1, 0, 0, 0.4, 0, -0.9, 0.5, 0.8, -0.3};
-        drape_scene_def scene;
-        drape_cloth_def cloth;
-        drape_model *m = NULL;
+        drape_scene_def scene = scene_def();
+        drape_cloth_def cloth = cloth_def();
+        scoped_model *m = NULL;
         drape_check_result results[16];
         int32_t count = 0;
-        drape_scene_def_init(&scene, sizeof scene);
-        drape_cloth_def_init(&cloth, sizeof cloth);
         cloth.mesh.positions = k == 3 ? tetrahedron : x;
         cloth.mesh.triangles = meshes[k].triangle;
         cloth.mesh.node_count = (size_t)meshes[k].nodes;
@@ -198,7 +186,7 @@ START_TEST(small_meshes)
         cloth.material = material, cloth.material_count = 3;
         cloth.terms = &term, cloth.term_count = 1;
         scene.cloths = &cloth, scene.cloth_count = 1;
-        ck_assert_msg(drape_model_create(ctx, &scene, &m) == DRAPE_OK, "%s", drape_context_message(ctx));
+        assert_ok(ctx, drape_model_create(ctx, &scene, &m));
         const drape_elements *el = &m->terms[0].elements;
         for (int32_t e = 0; e < el->count; e++) {
             double q;
@@ -209,11 +197,5 @@ START_TEST(small_meshes)
         ck_assert_int_gt(count, 0);
         for (int i = 0; i < count && i < 16; i++)
             ck_assert_msg(results[i].pass, "mesh %d, %s: %g", (int)k, results[i].what, results[i].error);
-        drape_model_destroy(&m);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("patch", uniform_strain_is_exact, only_rigid_motions_are_free,
-      isometric_bending_has_no_strain_of_second_order, small_meshes)

@@ -53,7 +53,7 @@ static void check_projected(int n, const double *a, const double *p)
     ck_assert_double_le(fabs(inner), 1e-13 * scale * scale);
 }
 
-START_TEST(it_is_the_nearest)
+TEST(it_is_the_nearest)
 {
     uint64_t seed = 4711;
     for (int n = 1; n <= N; n++)
@@ -69,9 +69,8 @@ START_TEST(it_is_the_nearest)
                 ck_assert_double_le(fabs(again[i] - p[i]), 1e-14 * norm(n, a));
         }
 }
-END_TEST
 
-START_TEST(a_positive_matrix_keeps_its_bits)
+TEST(a_positive_matrix_keeps_its_bits)
 {
     uint64_t seed = 5;
     for (int n = 1; n <= N; n++) {
@@ -88,10 +87,9 @@ START_TEST(a_positive_matrix_keeps_its_bits)
         ck_assert_mem_eq(p, a, (size_t)(n * n) * sizeof *a);
     }
 }
-END_TEST
 
 /* A NaN must stay a NaN, and must not make the rotations endless. */
-START_TEST(nan_stays)
+TEST(nan_stays)
 {
     uint64_t seed = 9;
     double a[N * N];
@@ -103,7 +101,6 @@ START_TEST(nan_stays)
         finite = finite && isfinite(a[i]);
     ck_assert(!finite);
 }
-END_TEST
 
 /* ---- The membrane ---- */
 
@@ -146,17 +143,11 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
 /* Equal tension in both directions: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it is
  * tension, and nothing is lost. If compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 -
  * nu) of a stiffness of about 1. */
-START_TEST(the_membrane_keeps_its_tension)
+TEST(the_membrane_keeps_its_tension)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    drape_model *m = membrane(ctx);
+    scoped_model *m = membrane(ctx);
     ck_assert_double_le(projected_away(ctx, m, 1.02, 1.02), 1e-13);
     ck_assert_double_ge(projected_away(ctx, m, 0.98, 0.98), 1e-3);
-    drape_model_destroy(&m);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("project", it_is_the_nearest, a_positive_matrix_keeps_its_bits, nan_stays,
-      the_membrane_keeps_its_tension)

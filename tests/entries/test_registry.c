@@ -30,7 +30,7 @@ static const struct {
               {&drape_self_contact_registry, 1, false, false}, {&drape_untangle_registry, 1, false, false}};
 #define TABLES (sizeof tables / sizeof *tables)
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     for (size_t t = 0; t < TABLES; t++) {
         const drape_registry *registry = tables[t].registry;
@@ -50,12 +50,11 @@ START_TEST(entries_are_well_formed)
         }
     }
 }
-END_TEST
 
 /* So no two entries have the same name. */
-START_TEST(every_entry_is_found_by_its_name)
+TEST(every_entry_is_found_by_its_name)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (size_t t = 0; t < TABLES; t++) {
         const drape_registry *registry = tables[t].registry;
         const int count = drape_registry_count(registry);
@@ -68,9 +67,7 @@ START_TEST(every_entry_is_found_by_its_name)
         }
         ck_assert_ptr_null(drape_registry_entry(registry, ctx, count));
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void refuse(drape_context *ctx, const drape_registry *registry, const char *name, const char *meant)
 {
@@ -89,9 +86,9 @@ static void refuse(drape_context *ctx, const drape_registry *registry, const cha
     ck_assert_msg(!meant || strstr(message, suggestion), "%s", message);
 }
 
-START_TEST(other_names_are_refused_with_the_list)
+TEST(other_names_are_refused_with_the_list)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (size_t t = 0; t < TABLES; t++) {
         const drape_registry *registry = tables[t].registry;
         const char *first = registry->entries[0]->name;
@@ -104,13 +101,11 @@ START_TEST(other_names_are_refused_with_the_list)
         refuse(ctx, registry, other, first);
     }
     refuse(ctx, &drape_exporter_registry, "NPY", NULL);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(user_defined_entries_stand_behind_the_others)
+TEST(user_defined_entries_stand_behind_the_others)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_term_ops own = *drape_terms[0];
     const int count = drape_registry_count(&drape_term_registry);
     own.entry.name = "host.own";
@@ -121,9 +116,4 @@ START_TEST(user_defined_entries_stand_behind_the_others)
     ck_assert_str_eq(drape_registry_entry(&drape_term_registry, ctx, count)->name, "host.own");
     ck_assert_ptr_null(drape_registry_entry(&drape_term_registry, ctx, count + 1));
     refuse(ctx, &drape_term_registry, "host.owm", "host.own");
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("registry", entries_are_well_formed, every_entry_is_found_by_its_name,
-      other_names_are_refused_with_the_list, user_defined_entries_stand_behind_the_others)

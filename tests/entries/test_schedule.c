@@ -23,7 +23,7 @@ static void halve(drape_schedule *s, double h)
     drape_schedule_retry(s, h / 2);
 }
 
-START_TEST(times_are_counted)
+TEST(times_are_counted)
 {
     drape_schedule s;
     double t1, h;
@@ -38,9 +38,8 @@ START_TEST(times_are_counted)
     }
     ck_assert(!drape_schedule_next(&s, &t1, &h));
 }
-END_TEST
 
-START_TEST(asking_changes_nothing)
+TEST(asking_changes_nothing)
 {
     drape_schedule s;
     double t1, h, t2, h2;
@@ -55,10 +54,9 @@ START_TEST(asking_changes_nothing)
     ck_assert_double_eq(t1, 1.6);
     ck_assert_double_eq_tol(h, 0.1, 1e-15);
 }
-END_TEST
 
 /* Nothing happens in a step so short that 1/h^2 overflows, also before the first one. */
-START_TEST(a_step_is_not_too_short_to_be_computed)
+TEST(a_step_is_not_too_short_to_be_computed)
 {
     const drape_stepping all[] = {DRAPE_STEPS_COUNTED, DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
@@ -72,10 +70,9 @@ START_TEST(a_step_is_not_too_short_to_be_computed)
         ck_assert_double_eq(t1, 1e-30);
     }
 }
-END_TEST
 
 /* Rejected once, then twice: halves and quarters of the same interval; then the size grows again. */
-START_TEST(halves_fill_the_interval)
+TEST(halves_fill_the_interval)
 {
     static const struct {
         int halvings;
@@ -97,11 +94,10 @@ START_TEST(halves_fill_the_interval)
         accept(&s, t1);
     }
 }
-END_TEST
 
 /* Halved twice, parts stay as small as they are after steps that shall not grow, also in the next interval,
  * and grow after the first others that end where larger ones would. */
-START_TEST(parts_grow_only_where_they_may)
+TEST(parts_grow_only_where_they_may)
 {
     static const struct {
         double t1, h;
@@ -124,9 +120,8 @@ START_TEST(parts_grow_only_where_they_may)
         drape_schedule_accept(&s, t1, NAN, steps[i].grow);
     }
 }
-END_TEST
 
-START_TEST(the_end_cuts_and_tiny_remainders_join)
+TEST(the_end_cuts_and_tiny_remainders_join)
 {
     static const struct {
         double end, last;
@@ -155,10 +150,9 @@ START_TEST(the_end_cuts_and_tiny_remainders_join)
         }
     }
 }
-END_TEST
 
 /* 60 advances of 1/60 s in steps of 1/120 s take the same steps as one of 1 s. */
-START_TEST(advances_do_not_shift_the_count)
+TEST(advances_do_not_shift_the_count)
 {
     drape_schedule s;
     double t1 = 0, h;
@@ -175,9 +169,8 @@ START_TEST(advances_do_not_shift_the_count)
     }
     ck_assert_int_eq(steps, 120);
 }
-END_TEST
 
-START_TEST(an_interval_left_half_done_is_given_up)
+TEST(an_interval_left_half_done_is_given_up)
 {
     drape_schedule s;
     double t1, h;
@@ -196,12 +189,11 @@ START_TEST(an_interval_left_half_done_is_given_up)
     ck_assert_double_eq(t1, 0.75);
     ck_assert_double_eq(sum, 0.25);
 }
-END_TEST
 
 /* For any sequence of rejections and ends, times increase strictly, h is the difference of times up to
  * their rounding, an advance ends exactly at its end, the sizes add up, and no step is larger than dt (1 +
  * 1e-9). */
-START_TEST(any_sequence_fills_the_time)
+TEST(any_sequence_fills_the_time)
 {
     for (uint64_t trial = 1; trial <= 1000; trial++) {
         uint64_t seed = trial * 1000003;
@@ -241,10 +233,9 @@ START_TEST(any_sequence_fills_the_time)
         }
     }
 }
-END_TEST
 
 /* Proposed steps: no step exceeds the proposal (except by the last 1e-9), and no tiny one is left over. */
-START_TEST(proposed_steps_reach_the_end)
+TEST(proposed_steps_reach_the_end)
 {
     for (uint64_t trial = 1; trial <= 500; trial++) {
         uint64_t seed = trial * 7919;
@@ -269,10 +260,9 @@ START_TEST(proposed_steps_reach_the_end)
         ck_assert_double_eq_tol(sum, end, 1e-12);
     }
 }
-END_TEST
 
 /* Whatever size a controller proposes after a rejection, the next step is smaller or there is none. */
-START_TEST(no_step_is_tried_again_at_its_size)
+TEST(no_step_is_tried_again_at_its_size)
 {
     static const drape_stepping kinds[] = {DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
     for (int k = 0; k < 2; k++) {
@@ -290,11 +280,10 @@ START_TEST(no_step_is_tried_again_at_its_size)
         ck_assert_double_lt(h, tried);
     }
 }
-END_TEST
 
 /* A step that is to end elsewhere: it may also be longer than the one before, and be halved; counting
  * restarts at its end. */
-START_TEST(a_cut_step_ends_at_its_end)
+TEST(a_cut_step_ends_at_its_end)
 {
     drape_schedule s;
     double t1, h;
@@ -317,10 +306,9 @@ START_TEST(a_cut_step_ends_at_its_end)
     drape_schedule_aim(&s, 5); /* another advance: the cut is forgotten */
     ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == 2.5 && h == 1);
 }
-END_TEST
 
 /* Steps that are proposed or free lead to the cut, and go on from there to the end. */
-START_TEST(other_steps_lead_to_the_cut)
+TEST(other_steps_lead_to_the_cut)
 {
     static const drape_stepping kinds[] = {DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
     for (int k = 0; k < 2; k++) {
@@ -337,10 +325,3 @@ START_TEST(other_steps_lead_to_the_cut)
         ck_assert(drape_schedule_next(&s, &t1, &h) && t1 == (k ? 10 : 1.25));
     }
 }
-END_TEST
-
-SUITE("schedule", a_cut_step_ends_at_its_end, other_steps_lead_to_the_cut, times_are_counted,
-      asking_changes_nothing, a_step_is_not_too_short_to_be_computed, halves_fill_the_interval,
-      parts_grow_only_where_they_may, the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count,
-      an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, proposed_steps_reach_the_end,
-      no_step_is_tried_again_at_its_size)

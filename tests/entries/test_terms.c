@@ -71,9 +71,8 @@ static drape_model *try_alone(drape_context *ctx, const variant *v)
 
 static bool takes(drape_context *ctx, const drape_term_ops *ops, enum model_mesh mesh)
 {
-    drape_model *model = try_alone(ctx, &(variant){.ops = ops, .mesh = mesh, .param = -1});
+    scoped_model *model = try_alone(ctx, &(variant){.ops = ops, .mesh = mesh, .param = -1});
     bool built = model != NULL;
-    drape_model_destroy(&model);
     return built;
 }
 
@@ -104,16 +103,15 @@ static drape_model *model_of(drape_context *ctx, const variant *v)
 static void use_variant(drape_context *ctx, const variant *v,
                         void (*use)(drape_context *ctx, const variant *v, const drape_model *model))
 {
-    drape_model *model = model_of(ctx, v);
+    scoped_model *model = model_of(ctx, v);
     if (model)
         use(ctx, v, model);
-    drape_model_destroy(&model);
 }
 
 /* Calls use for every term, mesh and choice, and with dashpots. */
 static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, const drape_model *model))
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     for (int i = 0; drape_terms[i]; i++)
         for (int mesh = 0; mesh < MESH_COUNT; mesh++)
             for (int p = -1; p < drape_terms[i]->entry.param_count; p++) {
@@ -126,7 +124,6 @@ static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, c
                                 &(variant){drape_terms[i], (enum model_mesh)mesh, p, c, (mesh + c) % 2 == 0},
                                 use);
             }
-    drape_context_destroy(&ctx);
 }
 
 static const char *name_of(const variant *v)
@@ -181,7 +178,7 @@ static double largest(const double *a, size_t n)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-START_TEST(entries_are_well_formed)
+TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_terms[count]; count++) {
@@ -199,7 +196,6 @@ START_TEST(entries_are_well_formed)
     }
     ck_assert_int_eq(drape_registry_count(&drape_term_registry), count);
 }
-END_TEST
 
 /* ---- Derivatives ---- */
 
@@ -231,11 +227,10 @@ static void check_variant(drape_context *ctx, const variant *v, const drape_mode
     drape_arena_free(&memory);
 }
 
-START_TEST(derivatives_agree_with_differences)
+TEST(derivatives_agree_with_differences)
 {
     for_all_variants(check_variant);
 }
-END_TEST
 
 /* ---- The checker can fail ---- */
 
@@ -284,15 +279,15 @@ static const drape_term_ops wrong_term = {
     .build = wrong_build,
     .measure = wrong_measure};
 
-START_TEST(mistakes_are_found)
+TEST(mistakes_are_found)
 {
     static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
     static const char *const found_as[] = {NULL, "gradient of measure", "Hessian of measure", "symmetry",
                                            "net force"};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     ck_assert_int_eq(drape_context_add_term(ctx, &wrong_term), DRAPE_OK);
     const drape_entry_def term = {.type = "host.wrong"};
-    drape_model *model = make_model(ctx, &(model_def){.mesh = MESH_CURVED, .terms = &term, .term_count = 1});
+    scoped_model *model = make_model(ctx, &(model_def){.mesh = MESH_CURVED, .terms = &term, .term_count = 1});
     drape_arena memory = drape_arena_of(ctx);
     drape_system *system = make_system(&memory, model, 1);
     for (int w = WRONG_NOTHING; w <= WRONG_MANNERS; w++) {
@@ -309,15 +304,12 @@ START_TEST(mistakes_are_found)
     }
     drape_system_destroy(&system);
     drape_arena_free(&memory);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* A damped term has no dashpots until they have a coefficient. */
-START_TEST(dashpots_need_their_number)
+TEST(dashpots_need_their_number)
 {
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_term_ops ops = wrong_term;
     drape_model *model = NULL;
     ops.damped = true;
@@ -328,9 +320,7 @@ START_TEST(dashpots_need_their_number)
     ck_assert_msg(
         strstr(drape_context_message(ctx), "has 2 numbers of rest data an element; its kind needs 3"), "%s",
         drape_context_message(ctx));
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Parts ---- */
 
@@ -399,15 +389,15 @@ static const drape_term_ops parts_term = {
     .part_nodes = 2,
     .part = parts_part};
 
-START_TEST(user_defined_parts_are_right)
+TEST(user_defined_parts_are_right)
 {
     static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     const drape_entry_def term = {.type = "host.parts"};
     ck_assert_int_eq(drape_context_add_term(ctx, &parts_term), DRAPE_OK);
     parts_fault = PARTS_GOOD;
     for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
-        drape_model *model =
+        scoped_model *model =
             make_model(ctx, &(model_def){.mesh = (enum model_mesh)mesh, .terms = &term, .term_count = 1});
         ck_assert_int_eq(model->terms[0].parts.count, model->edge_count);
         drape_arena memory = drape_arena_of(ctx);
@@ -419,17 +409,14 @@ START_TEST(user_defined_parts_are_right)
             ck_assert_msg(results[i].pass, "%s is off by %g", results[i].what, results[i].error);
         drape_system_destroy(&system);
         drape_arena_free(&memory);
-        drape_model_destroy(&model);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(wrong_parts_are_refused)
+TEST(wrong_parts_are_refused)
 {
     static const char *const said[] = {NULL, " links and made ", "lacks a node of its part ",
                                        "outside of those", "outside of those"};
-    drape_context *ctx = make_context();
+    scoped_context *ctx = make_context();
     drape_term_ops ops = parts_term;
     const drape_entry_def term = {.type = "host.parts"};
     const model_def def = {.mesh = MESH_SQUARE, .terms = &term, .term_count = 1};
@@ -443,9 +430,7 @@ START_TEST(wrong_parts_are_refused)
         ck_assert_msg(strstr(drape_context_message(ctx), said[fault]), "%d: %s", fault,
                       drape_context_message(ctx));
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Physics of one term ---- */
 
@@ -480,11 +465,10 @@ static void check_invariance(drape_context *ctx, const variant *v, const drape_m
     drape_arena_free(&memory);
 }
 
-START_TEST(energy_does_not_change_with_rigid_motion)
+TEST(energy_does_not_change_with_rigid_motion)
 {
     for_all_variants(check_invariance);
 }
-END_TEST
 
 /* The largest force that a strain of rounding, about 1e-15, can cause. */
 static double rounding_force(const drape_model *model, const drape_point *point)
@@ -527,11 +511,10 @@ static void check_rest(drape_context *ctx, const variant *v, const drape_model *
     drape_arena_free(&memory);
 }
 
-START_TEST(no_force_at_rest)
+TEST(no_force_at_rest)
 {
     for_all_variants(check_rest);
 }
-END_TEST
 
 /* Dissipative forces take power at every velocity, laws at every rate. Internal ones take none from a rigid
  * motion. */
@@ -564,11 +547,10 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
     drape_arena_free(&memory);
 }
 
-START_TEST(dissipation_takes_power)
+TEST(dissipation_takes_power)
 {
     for_all_variants(check_power);
 }
-END_TEST
 
 /* Newton predicts the forces on measures after a correction p by their change df/dx . p. It is compared
  * with a difference of fourth order whose step makes the error about 1e-13 of the size of the forces. */
@@ -612,11 +594,10 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
     drape_arena_free(&s.arena);
 }
 
-START_TEST(forces_ahead_agree_with_differences)
+TEST(forces_ahead_agree_with_differences)
 {
     for_all_variants(check_stress);
 }
-END_TEST
 
 /* ---- Interface ---- */
 
@@ -668,11 +649,10 @@ static void check_ranges(drape_context *ctx, const variant *v, const drape_model
     drape_arena_free(&s.arena);
 }
 
-START_TEST(elements_do_not_depend_on_the_range)
+TEST(elements_do_not_depend_on_the_range)
 {
     for_all_variants(check_ranges);
 }
-END_TEST
 
 /* One thread or several give the same bits. The meshes here have more than one block of 32 elements. */
 static void check_threads(drape_context *ctx, const variant *v, const drape_model *model)
@@ -700,11 +680,10 @@ static void check_threads(drape_context *ctx, const variant *v, const drape_mode
     drape_arena_free(&s.arena);
 }
 
-START_TEST(threads_give_the_same_bits)
+TEST(threads_give_the_same_bits)
 {
     for_all_variants(check_threads);
 }
-END_TEST
 
 /* x'(projected Jacobian - mass)x >= 0 for laws and measures: a sum of positive semidefinite blocks is
  * positive semidefinite. */
@@ -734,14 +713,7 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
     drape_arena_free(&s.arena);
 }
 
-START_TEST(projected_jacobians_are_positive)
+TEST(projected_jacobians_are_positive)
 {
     for_all_variants(check_projection);
 }
-END_TEST
-
-SUITE("terms", entries_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
-      user_defined_parts_are_right, wrong_parts_are_refused, dashpots_need_their_number,
-      energy_does_not_change_with_rigid_motion, no_force_at_rest, dissipation_takes_power,
-      forces_ahead_agree_with_differences, elements_do_not_depend_on_the_range, threads_give_the_same_bits,
-      projected_jacobians_are_positive)

@@ -21,8 +21,7 @@ static drape_setting word(const char *name, const char *text)
 
 static void start(scene *s, const drape_setting *settings, size_t count, const char *controller, double dt)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = "verlet";
     def.integrator_settings = settings;
     def.integrator_setting_count = count;
@@ -46,13 +45,13 @@ static scene sheet(void)
 /* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start. Here
  * the same numbers are computed on positions only, with forces of the library. Rounding: positions of 1 m
  * have 1e-16, which the recurrence sums twice: 200^2/2 times that. */
-START_TEST(the_position_form_is_the_recurrence_of_positions)
+TEST(the_position_form_is_the_recurrence_of_positions)
 {
     const double h = 1e-3, c = 1 - 0.3 / 100;
     const int steps = 200;
     const drape_setting settings[] = {number("substeps", 1), word("form", "position"),
                                       number("damping", 0.3)};
-    scene s = sheet();
+    scoped_scene s = sheet();
     start(&s, settings, 3, "fixed", h);
     size_t n = 3 * (size_t)s.model->node_count;
     double *x = malloc(4 * n * sizeof *x), *before = x + n, *v = before + n, *g = v + n;
@@ -76,9 +75,7 @@ START_TEST(the_position_form_is_the_recurrence_of_positions)
     for (size_t i = 0; i < n; i++)
         ck_assert_double_eq_tol(drape_sim_positions(s.sim)[i], x[i], 1e-11);
     free(x);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Stability ---- */
 
@@ -86,13 +83,13 @@ END_TEST
  * the second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n
  * + 1))), the largest for j = n. Springs across the rows have no stiffness. With 30 products for 2 x 8 x 3
  * unknowns, Lanczos is accurate to 1e-6; the differences are accurate to 1e-6 too. */
-START_TEST(omega_is_that_of_a_chain)
+TEST(omega_is_that_of_a_chain)
 {
     const double k = 40, m = 0.01;
-    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
-                          ", 'terms': [{'type': 'spring.structural', 'stiffness': %g}],"
-                          "'pins': [{'edge': 'left'}]}], 'gravity': [0, 0, 0], 'duration': 1}",
-                          9, 2, 0.8, 1e3, 18 * m, k);
+    scoped_scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
+                                 ", 'terms': [{'type': 'spring.structural', 'stiffness': %g}],"
+                                 "'pins': [{'edge': 'left'}]}], 'gravity': [0, 0, 0], 'duration': 1}",
+                                 9, 2, 0.8, 1e3, 18 * m, k);
     const drape_setting settings[] = {number("substeps", 4)};
     start(&s, settings, 1, "fixed", 0.01);
     drape_stability found;
@@ -105,18 +102,16 @@ START_TEST(omega_is_that_of_a_chain)
     ck_assert_double_eq(found.substep, 0.0025);
     ck_assert_double_eq_tol(found.step, 4 * found.limit, 1e-12);
     ck_assert_double_eq(found.damping, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* A start off equilibrium by 1e-6 stays near it below the limit and grows above it, damped or not. */
-START_TEST(steps_are_stable_only_below_the_limit)
+TEST(steps_are_stable_only_below_the_limit)
 {
     const char *const forms[] = {"position", "velocity"};
     for (int f = 0; f < 2; f++)
         for (int over = 0; over < 2; over++)
             for (double c = 0; c < 1; c += 0.5) {
-                scene s =
+                scoped_scene s =
                     scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
                                 ", 'terms': [{'type': 'spring.structural', 'stiffness': 40, 'damping': %g}],"
                                 "'pins': [{'edge': 'left'}]}], 'gravity': [0, 0, 0], 'duration': 1}",
@@ -136,10 +131,8 @@ START_TEST(steps_are_stable_only_below_the_limit)
                     status = drape_sim_advance(s.sim, k * h);
                 ck_assert_msg(over ? status < 0 : status == 0, "%s, dashpots %g, %g of the limit: %s",
                               forms[f], c, h / found.limit, drape_context_message(s.ctx));
-                scene_close(&s);
             }
 }
-END_TEST
 
 /* ---- Moving nodes ---- */
 
@@ -166,7 +159,7 @@ static void one_step(scene *s, const char *rule, double x[3], double v[3])
 
 /* From (0, 0.01, 0) the displacement of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0)
  * with the offset, and x = x0 + (1 - 0.25)(t - x0). */
-START_TEST(a_plane_stops_as_in_cs184)
+TEST(a_plane_stops_as_in_cs184)
 {
     double x[3], v[3];
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 3, 0], 'friction': 0.25}");
@@ -176,11 +169,10 @@ START_TEST(a_plane_stops_as_in_cs184)
     ck_assert_double_eq_tol(v[0], x[0] / 0.01, 1e-12);
     ck_assert_double_eq_tol(v[1], (x[1] - 0.01) / 0.01, 1e-12);
 }
-END_TEST
 
 /* A plane that moves with the tangential velocity of the node does not drag it: the displacement relative
  * to the plane is straight down, and friction acts on that only. */
-START_TEST(friction_is_against_the_moving_surface)
+TEST(friction_is_against_the_moving_surface)
 {
     double x[3], v[3];
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25, "
@@ -189,10 +181,9 @@ START_TEST(friction_is_against_the_moving_surface)
     ck_assert_double_eq_tol(x[0], 0.01, 1e-15);
     ck_assert_double_eq_tol(x[1], 0.01 + 0.75 * (0.0001 - 0.01), 1e-15);
 }
-END_TEST
 
 /* A sphere of radius 1 below the origin: the node at (0.01, -0.01) is moved onto it along the radius. */
-START_TEST(a_sphere_pushes_along_its_radius)
+TEST(a_sphere_pushes_along_its_radius)
 {
     double x[3], v[3], from[2] = {0.01, 0.99}, length = sqrt(0.01 * 0.01 + 0.99 * 0.99);
     scene s = flyers("{'type': 'sphere', 'center': [0, -1, 0], 'radius': 1, 'friction': 0.5}");
@@ -205,22 +196,20 @@ START_TEST(a_sphere_pushes_along_its_radius)
     ck_assert_double_eq_tol(x[0], from[0] / length, 1e-15);
     ck_assert_double_eq_tol(x[1], from[1] / length - 1, 1e-15);
 }
-END_TEST
 
-START_TEST(a_floor_keeps_the_place_as_in_boson)
+TEST(a_floor_keeps_the_place_as_in_boson)
 {
     double x[3], v[3];
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
     one_step(&s, "boson", x, v);
     ck_assert(x[0] == 0 && x[1] == 0.01 && x[2] == 0 && v[0] == 0 && v[1] == 0);
 }
-END_TEST
 
 /* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 remains along it, less 0.5 v, and nothing across. Of a force
  * straight down nothing remains, where Boson divides 0 by 0; a force upwards has no friction. */
 static void check_friction(const char *floor, const double v[12], const double expected[12], double power)
 {
-    scene s = flyers(floor);
+    scoped_scene s = flyers(floor);
     drape_arena memory = drape_arena_of(s.ctx);
     drape_motion *motion = NULL;
     ck_assert_int_eq(drape_motion_create(&memory, s.model, &motion), DRAPE_OK);
@@ -235,32 +224,29 @@ static void check_friction(const char *floor, const double v[12], const double e
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 1e-14);
     drape_arena_free(&memory);
-    scene_close(&s);
 }
 
-START_TEST(friction_on_forces_as_in_boson)
+TEST(friction_on_forces_as_in_boson)
 {
     const double v[12] = {0.2, 0.1, 0}, expected[12] = {-1 + 0.1, 0.05, 0, 0, 0, 0, -3, -8, 0, -3, 8, 0};
     check_friction("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}", v,
                    expected, 0);
 }
-END_TEST
 
 /* A floor at (1, 0, 0) m/s drags nodes at rest with 0.5 N. The first has 1.5 N instead of 3, the second 0.5
  * instead of 0: the floor's power is -1.5 + 0.5 W. */
-START_TEST(friction_of_a_moving_floor_has_power)
+TEST(friction_of_a_moving_floor_has_power)
 {
     const double v[12] = {0}, expected[12] = {-1.5, 0, 0, -0.5, 0, 0, -3, -8, 0, -3, 8, 0};
     check_friction("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25, "
                    "'track': [[0, [0, 0, 0]], [1, [1, 0, 0]]]}",
                    v, expected, -1);
 }
-END_TEST
 
 /* The energy account of a sheet at rest at y = 0 above a body that moves at once, after 0.1 s. */
 static drape_energy account_above(const char *body, const char *form, const char *rule)
 {
-    scene s = scene_model(
+    scoped_scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, "
         "'height': 0.2, 'orientation': 'horizontal', 'transform': {'translate': [-0.1, 0, 0.1]}}, "
         "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
@@ -271,7 +257,6 @@ static drape_energy account_above(const char *body, const char *form, const char
     start(&s, settings, 5, "fixed", 0.01);
     scene_advance(&s, 0.1);
     const drape_energy e = drape_sim_energy(s.sim);
-    scene_close(&s);
     return e;
 }
 
@@ -280,7 +265,7 @@ static drape_energy account_above(const char *body, const char *form, const char
  * by m u^2/2, that of the impact without rebound. The velocity form ends with half a kick of gravity, m/2 (g
  * h/2)^2. Boson's friction carries the weight instead. Until this work was counted, the check of energies
  * took it for energy out of nothing and stopped the run. */
-START_TEST(a_rising_floor_does_work)
+TEST(a_rising_floor_does_work)
 {
     const char *const forms[] = {"position", "velocity"}, *const rules[] = {"cs184", "boson"};
     const double mass = 0.2 * 0.2 * 0.2, u = 2, kick = 9.81 * 1e-3 / 2;
@@ -293,19 +278,18 @@ START_TEST(a_rising_floor_does_work)
         assert_below(fabs(e.numerical - mass * u * u / 2), mass * kick * kick + 1e-12);
     }
 }
-END_TEST
 
 /* Three nodes in a line, 1 m apart; the first is pinned, the others are at 1.5 and 3.5. One pass: the
  * spring to the pin is cut to 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m in
  * equal halves. The pass leaves the first one too long, as in CS184; further passes do
  * not. */
-START_TEST(strains_are_limited)
+TEST(strains_are_limited)
 {
     for (int many = 0; many < 2; many++) {
-        scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
-                              ", 'terms': [{'type': 'spring.structural', 'stiffness': 0}],"
-                              "'pins': [{'nodes': [0, 3]}]}], 'gravity': [0, 0, 0], 'duration': 1}",
-                              3, 2, 2.0, 1e3, 6.0);
+        scoped_scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
+                                     ", 'terms': [{'type': 'spring.structural', 'stiffness': 0}],"
+                                     "'pins': [{'nodes': [0, 3]}]}], 'gravity': [0, 0, 0], 'duration': 1}",
+                                     3, 2, 2.0, 1e3, 6.0);
         drape_verlet_limit limit;
         drape_arena arena = drape_arena_of(s.ctx);
         ck_assert_int_eq(drape_verlet_limit_create(&arena, s.model, 0.1, many ? 1000 : 1, &limit), DRAPE_OK);
@@ -324,10 +308,8 @@ START_TEST(strains_are_limited)
         }
         ck_assert(x[0] == 0);
         drape_arena_free(&arena);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* 33 x 12 nodes, moved at random by up to `by`, with all kinds of springs. */
 static scene shaken(double by, double *x)
@@ -364,12 +346,12 @@ static void limit_by_hand(const drape_verlet_limit *l, double *x)
 
 /* Whether many, few or no springs are too long, patches of springs give the same bits as one spring after the
  * other. */
-START_TEST(patches_are_one_spring_after_the_other)
+TEST(patches_are_one_spring_after_the_other)
 {
     static const double moves[] = {0.001, 0.005, 0.01, 0.02, 0.05, 0.2};
     for (int k = 0; k < 6; k++) {
         double x[3 * 33 * 12], y[3 * 33 * 12];
-        scene s = shaken(moves[k], x);
+        scoped_scene s = shaken(moves[k], x);
         drape_verlet_limit limit;
         drape_arena arena = drape_arena_of(s.ctx);
         ck_assert_int_eq(drape_verlet_limit_create(&arena, s.model, 0.1, 1, &limit), DRAPE_OK);
@@ -380,18 +362,16 @@ START_TEST(patches_are_one_spring_after_the_other)
             ck_assert_msg(memcmp(x, y, sizeof x) == 0, "moved by %g, pass %d", moves[k], again);
         }
         drape_arena_free(&arena);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Springs in runs, the weight once, and the other terms by the system: sums in another order than the
  * system's. A node has 12 springs of up to 3 N, so each of its sums is off by less than 50 roundings of
  * that. */
-START_TEST(forces_are_those_of_the_system)
+TEST(forces_are_those_of_the_system)
 {
     double x[3 * 33 * 12], v[3 * 33 * 12], g[3 * 33 * 12], expected[3 * 33 * 12];
-    scene s = shaken(0.05, x);
+    scoped_scene s = shaken(0.05, x);
     const drape_setting settings[] = {number("substeps", 1)};
     start(&s, settings, 1, "fixed", 0.01);
     drape_verlet_force *force = NULL;
@@ -404,9 +384,7 @@ START_TEST(forces_are_those_of_the_system)
     for (size_t i = 0; i < sizeof g / sizeof *g; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 50 * 3 * 2.3e-16);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Cloth against cloth ---- */
 
@@ -464,7 +442,7 @@ static scene crumpled(double size, double thickness, double *x)
 static void check_against_the_rule(double size, bool own, double share)
 {
     double x[3 * 196], y[3 * 196];
-    scene s = crumpled(size, 0.02, x);
+    scoped_scene s = crumpled(size, 0.02, x);
     drape_verlet_self self;
     drape_arena arena = drape_arena_of(s.ctx);
     ck_assert_int_eq(drape_verlet_self_create(&arena, s.model, own, &self), DRAPE_OK);
@@ -480,10 +458,9 @@ static void check_against_the_rule(double size, bool own, double share)
             x[i] += 1e-3 * sin(0.7 * i + again);
     }
     drape_arena_free(&arena);
-    scene_close(&s);
 }
 
-START_TEST(boxes_find_all_pairs)
+TEST(boxes_find_all_pairs)
 {
     static const double sizes[] = {0.02, 0.08, 0.15, 0.3, 1, 50};
     for (int k = 0; k < 6; k++)
@@ -492,13 +469,12 @@ START_TEST(boxes_find_all_pairs)
             check_against_the_rule(sizes[k], own, 1);
         }
 }
-END_TEST
 
 /* CS184's own boxes miss a pair across a face and find one inside a box. The boxes are 3 x 1/14 wide. */
-START_TEST(own_boxes_miss_what_cs184_misses)
+TEST(own_boxes_miss_what_cs184_misses)
 {
     double x[3 * 196], face = 3.0 / 14;
-    scene s = crumpled(50, 0.02, x);
+    scoped_scene s = crumpled(50, 0.02, x);
     const double pairs[] = {face - 0.005, 0.05, 0.05, face + 0.005, 0.05, 0.05,
                             0.05,         0.05, 0.05, 0.06,         0.05, 0.05};
     memcpy(x + 30, pairs, sizeof pairs);
@@ -511,15 +487,13 @@ START_TEST(own_boxes_miss_what_cs184_misses)
     ck_assert(memcmp(x + 30, before + 30, 6 * sizeof *x) == 0);
     ck_assert_double_eq_tol(x[36], 0.05 - 0.03, 1e-12);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
 
 /* Pushes, which may take hours in a heap of many points, end at once when the step is cancelled. */
-START_TEST(a_cancelled_push_moves_nothing)
+TEST(a_cancelled_push_moves_nothing)
 {
     double x[3 * 196], before[3 * 196];
-    scene s = crumpled(0.02, 0.02, x);
+    scoped_scene s = crumpled(0.02, 0.02, x);
     const atomic_bool raised = true;
     drape_verlet_self self;
     drape_arena arena = drape_arena_of(s.ctx);
@@ -532,14 +506,4 @@ START_TEST(a_cancelled_push_moves_nothing)
     drape_verlet_self_push(&self, 1, x);
     ck_assert(memcmp(x, before, sizeof x) != 0);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("verlet", a_cancelled_push_moves_nothing, the_position_form_is_the_recurrence_of_positions,
-      omega_is_that_of_a_chain, steps_are_stable_only_below_the_limit, a_plane_stops_as_in_cs184,
-      friction_is_against_the_moving_surface, a_sphere_pushes_along_its_radius,
-      a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson,
-      friction_of_a_moving_floor_has_power, a_rising_floor_does_work, strains_are_limited,
-      patches_are_one_spring_after_the_other, forces_are_those_of_the_system, boxes_find_all_pairs,
-      own_boxes_miss_what_cs184_misses)

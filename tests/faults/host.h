@@ -158,8 +158,7 @@ static inline host_sim host_open(const char *integrator, const char *controller,
              " 'integrator': {'method': 'be', 'dt': 0.015625%s}, 'controller': {%s}, 'duration': 1}",
              stretch ? "'stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 1e-3}, " : "",
              integrator, controller);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(text);
     ck_assert_int_eq(drape_context_create(NULL, &s.ctx), DRAPE_OK);
     ck_assert_int_eq(drape_context_add_term(s.ctx, &host_term), DRAPE_OK);
     drape_status status = drape_scene_parse(s.ctx, text, "host", &scene);
@@ -167,7 +166,7 @@ static inline host_sim host_open(const char *integrator, const char *controller,
         status = drape_scene_compile(scene, &s.model);
     if (!status)
         status = drape_sim_create(s.ctx, s.model, NULL, &s.sim);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, status);
     drape_scene_destroy(&scene);
     return s;
 }

@@ -39,9 +39,8 @@ static bool cancel(void *user)
 
 static drape_context *context(asked *a)
 {
-    drape_context_def def;
+    drape_context_def def = context_def();
     drape_context *ctx = NULL;
-    drape_context_def_init(&def, sizeof def);
     def.allocate = failing_allocate;
     def.release = failing_release;
     def.allocator_user = &a->memory;
@@ -54,9 +53,9 @@ static drape_context *context(asked *a)
 /* Reads and compiles a scene, makes a sim, checks and measures it, saves and restores it. */
 static drape_status live(drape_context *ctx, const char *path)
 {
-    drape_scene *scene = NULL;
-    drape_model *model = NULL;
-    drape_sim *sim = NULL;
+    scoped_parsed *scene = NULL;
+    scoped_model *model = NULL;
+    scoped_sim *sim = NULL;
     int count;
     drape_status status = drape_scene_load(ctx, path, &scene);
     ck_assert_int_eq(status != DRAPE_OK, scene == NULL);
@@ -77,9 +76,6 @@ static drape_status live(drape_context *ctx, const char *path)
         drape_profile profile;
         status = drape_profile_measure(ctx, sim, terms, &profile);
     }
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_scene_destroy(&scene);
     return status;
 }
 
@@ -87,13 +83,12 @@ static drape_status live(drape_context *ctx, const char *path)
 static long calls_of_a_life(const char *path)
 {
     asked a = {.at = 0};
-    drape_context *ctx = context(&a);
+    scoped_context *ctx = context(&a);
     ck_assert_int_eq(live(ctx, path), DRAPE_OK);
-    drape_context_destroy(&ctx);
     return a.calls;
 }
 
-START_TEST(it_may_be_at_any_stage)
+TEST(it_may_be_at_any_stage)
 {
     char path[] = "/tmp/drape-cancel-XXXXXX";
     const int fd = mkstemp(path);
@@ -113,6 +108,3 @@ START_TEST(it_may_be_at_any_stage)
     }
     unlink(path);
 }
-END_TEST
-
-SUITE("cancel", it_may_be_at_any_stage)

@@ -82,7 +82,7 @@ static void close_victim(victim *v, const char *integrator, const char *settings
 
 /* ---- Damage ---- */
 
-START_TEST(cut_anywhere_it_is_refused)
+TEST(cut_anywhere_it_is_refused)
 {
     victim v = make_victim("be", "");
     for (size_t size = 0; size < v.good.size; size++) {
@@ -93,10 +93,9 @@ START_TEST(cut_anywhere_it_is_refused)
     printf("# cut at each of %zu bytes\n", v.good.size);
     close_victim(&v, "be", "");
 }
-END_TEST
 
 /* The checksum detects any changed byte: each is tried with one bit flipped. */
-START_TEST(a_flipped_bit_is_refused)
+TEST(a_flipped_bit_is_refused)
 {
     victim v = make_victim("bdf2", "");
     for (size_t at = 0; at < v.good.size; at++) {
@@ -109,9 +108,8 @@ START_TEST(a_flipped_bit_is_refused)
     printf("# a bit flipped in each of %zu bytes\n", v.good.size);
     close_victim(&v, "bdf2", "");
 }
-END_TEST
 
-START_TEST(bytes_behind_the_end_are_refused)
+TEST(bytes_behind_the_end_are_refused)
 {
     victim v = make_victim("be", "");
     unsigned char *more = malloc(2 * v.good.size);
@@ -124,7 +122,6 @@ START_TEST(bytes_behind_the_end_are_refused)
     free(more);
     close_victim(&v, "be", "");
 }
-END_TEST
 
 static void seal(unsigned char *data, size_t size)
 {
@@ -156,7 +153,7 @@ static void forge(const char *integrator, const char *settings, uint64_t seed)
                    (size_t)(1 + (seed >> 24) % 8) < v.good.size - 16 - at ? 1 + (seed >> 24) % 8 : 1);
         }
         seal(copy, v.good.size);
-        drape_sim *sim = NULL;
+        scoped_sim *sim = NULL;
         int left = 3;
         ck_assert_int_eq(drape_sim_create(v.s.ctx, v.s.model, NULL, &sim), DRAPE_OK);
         ck_assert_int_eq(drape_sim_observe(sim, stop_soon, &left), DRAPE_OK);
@@ -166,21 +163,19 @@ static void forge(const char *integrator, const char *settings, uint64_t seed)
             refusals++;
         } else
             drape_sim_advance(sim, END);
-        drape_sim_destroy(&sim);
     }
     printf("# %s%s: %d of %d forged ones refused\n", integrator, settings, refusals, tries);
     free(copy);
     close_victim(&v, integrator, settings);
 }
 
-START_TEST(forged_ones_crash_nothing)
+TEST(forged_ones_crash_nothing)
 {
     for (size_t i = 0; drape_integrators[i]; i++)
         if (!drape_integrators[i]->steady_state)
             forge(drape_integrators[i]->entry.name, "", i + 1);
     forge("be", ", 'linear_solver': 'klu'", 99);
 }
-END_TEST
 
 /* ---- Of another scene ---- */
 
@@ -195,7 +190,7 @@ static void other_is_refused(victim *v, scene other, drape_status expected, cons
     scene_close(&other);
 }
 
-START_TEST(of_another_model_or_choice_it_is_refused)
+TEST(of_another_model_or_choice_it_is_refused)
 {
     victim v = make_victim("be", "");
     const drape_status wrong = DRAPE_E_ARGUMENT;
@@ -212,7 +207,6 @@ START_TEST(of_another_model_or_choice_it_is_refused)
     other_is_refused(&v, scene_open(SHEET, 2, 1e5, "be", 0.01, "", "halving", 61), wrong, "other settings");
     close_victim(&v, "be", "");
 }
-END_TEST
 
 static size_t find(const bytes *b, const char *text)
 {
@@ -223,7 +217,7 @@ static size_t find(const bytes *b, const char *text)
     return at;
 }
 
-START_TEST(of_another_version_or_build_it_is_refused)
+TEST(of_another_version_or_build_it_is_refused)
 {
     victim v = make_victim("be", "");
     size_t version = find(&v.good, "Drape ") + 6, arithmetic = find(&v.good, "arithmetic ") + 11,
@@ -242,12 +236,11 @@ START_TEST(of_another_version_or_build_it_is_refused)
     }
     close_victim(&v, "be", "");
 }
-END_TEST
 
 /* ---- Memory ---- */
 
 /* Each allocation of restoring, and of saving to a file, fails once. */
-START_TEST(without_memory_it_is_as_before)
+TEST(without_memory_it_is_as_before)
 {
     const char *const settings = ", 'linear_solver': 'pcg'";
     char path[] = "/tmp/drape-memory-XXXXXX";
@@ -285,7 +278,6 @@ START_TEST(without_memory_it_is_as_before)
     unlink(path);
     close_victim(&v, "be", settings);
 }
-END_TEST
 
 /* ---- Disks ---- */
 
@@ -306,7 +298,7 @@ static drape_status save_within(drape_sim *sim, const char *path, rlim_t most)
     return status;
 }
 
-START_TEST(a_full_disk_leaves_the_one_before)
+TEST(a_full_disk_leaves_the_one_before)
 {
     char folder[] = "/tmp/drape-full-XXXXXX", path[64], part[80];
     ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -338,9 +330,8 @@ START_TEST(a_full_disk_leaves_the_one_before)
     scene_close(&other);
     close_victim(&v, "be", "");
 }
-END_TEST
 
-START_TEST(no_folder_no_file_no_right)
+TEST(no_folder_no_file_no_right)
 {
     victim v = make_victim("be", "");
     refused(&v, drape_sim_save(v.s.sim, "/no/such/folder/checkpoint"), "no folder");
@@ -357,7 +348,6 @@ START_TEST(no_folder_no_file_no_right)
     ck_assert_int_eq(drape_sim_restore(NULL, "x"), DRAPE_E_ARGUMENT);
     close_victim(&v, "be", "");
 }
-END_TEST
 
 /* A host that cannot store the bytes refuses, at each of its calls in turn. */
 typedef struct picky {
@@ -371,7 +361,7 @@ static drape_status refuse_bytes(void *user, const void *data, size_t size)
     return ++p->calls == p->fail_at ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
-START_TEST(a_writer_that_fails_is_believed)
+TEST(a_writer_that_fails_is_believed)
 {
     victim v = make_victim("be", "");
     picky counter = {0};
@@ -385,9 +375,3 @@ START_TEST(a_writer_that_fails_is_believed)
     ck_assert_int_eq(drape_sim_save_to(v.s.sim, NULL, NULL), DRAPE_E_ARGUMENT);
     close_victim(&v, "be", "");
 }
-END_TEST
-
-SUITE("faults/checkpoint", cut_anywhere_it_is_refused, a_flipped_bit_is_refused,
-      bytes_behind_the_end_are_refused, forged_ones_crash_nothing, of_another_model_or_choice_it_is_refused,
-      of_another_version_or_build_it_is_refused, without_memory_it_is_as_before,
-      a_full_disk_leaves_the_one_before, no_folder_no_file_no_right, a_writer_that_fails_is_believed)

@@ -47,32 +47,29 @@ static void jump(long each)
     away = 0;
 }
 
-START_TEST(steps_do_not_depend_on_the_clock)
+TEST(steps_do_not_depend_on_the_clock)
 {
     for (size_t i = 0; i < ROWS; i++) {
-        scene good = scene_open(hung, integrators[i]);
+        scoped_scene good = scene_open(hung, integrators[i]);
         scene_advance(&good, 20 * FRAME);
         jump(3);
-        scene bad = scene_open(hung, integrators[i]);
+        scoped_scene bad = scene_open(hung, integrators[i]);
         scene_advance(&bad, 20 * FRAME);
         ck_assert_int_gt(reads, 0); /* the clock was read */
         jump(0);
         ck_assert_uint_eq(drape_sim_hash(good.sim), drape_sim_hash(bad.sim));
         const drape_statistics s = drape_sim_statistics(bad.sim);
         ck_assert(isfinite(s.wall_steps) && isfinite(s.wall_residual) && isfinite(s.wall_factor));
-        scene_close(&good);
-        scene_close(&bad);
     }
 }
-END_TEST
 
 /* However much time the clock says is left, a call makes no more steps than the frame and the debt need at
  * the integrator's own step, and the state is finite. */
-START_TEST(a_budget_on_a_jumping_clock_ends)
+TEST(a_budget_on_a_jumping_clock_ends)
 {
     for (size_t i = 0; i < ROWS; i++)
         for (long each = 1; each < 8; each++) {
-            scene s = scene_open(hung, integrators[i]);
+            scoped_scene s = scene_open(hung, integrators[i]);
             double before = 0;
             jump(each);
             for (int k = 0; k < 20; k++) {
@@ -89,10 +86,8 @@ START_TEST(a_budget_on_a_jumping_clock_ends)
             const double *x = drape_sim_positions(s.sim);
             for (size_t n = 0; n < 3 * (size_t)s.model->node_count; n++)
                 ck_assert(isfinite(x[n]));
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* Frames in a budget, on a clock that advances by a millisecond each time it is read and not otherwise, so
  * that a call takes the same time on any machine. newton_k would make 20 further iterations in each step for
@@ -112,7 +107,8 @@ static drape_status spend(void *user, const drape_event *event)
 /* ending: milliseconds that an observer takes after each attempt. */
 static timed run_in(double budget, int64_t ending)
 {
-    scene s = scene_open(hung, "newton_k', 'error': 1e-15, 'tolerance': 1e-15, 'linear_solver': 'auto");
+    scoped_scene s =
+        scene_open(hung, "newton_k', 'error': 1e-15, 'tolerance': 1e-15, 'linear_solver': 'auto");
     timed out = {0};
     ck_assert_int_eq(drape_sim_observe(s.sim, spend, &ending), DRAPE_OK);
     tick = 1e-3;
@@ -125,13 +121,12 @@ static timed run_in(double budget, int64_t ending)
     }
     tick = 0;
     out.iterations = drape_sim_statistics(s.sim).newton_iterations;
-    scene_close(&s);
     return out;
 }
 
 /* In three quarters of the time that all iterations take, a call makes fewer than all and more than the
  * least, one a frame; what an iteration takes is known after the first frames, which alone may be late. */
-START_TEST(further_iterations_end_in_time)
+TEST(further_iterations_end_in_time)
 {
     const timed all = run_in(3600, 0), some = run_in(0.75 * all.longest, 0);
     printf("# %d iterations in %g s a frame at most; %d in %g s, %d late\n", (int)all.iterations, all.longest,
@@ -139,11 +134,10 @@ START_TEST(further_iterations_end_in_time)
     ck_assert(some.iterations < all.iterations && some.iterations > 20);
     ck_assert_int_le(some.late, 2);
 }
-END_TEST
 
 /* An observer that takes 50 ms of the time leaves less for further iterations, and frames are not late for
  * it. */
-START_TEST(the_end_of_a_step_has_its_time)
+TEST(the_end_of_a_step_has_its_time)
 {
     const int64_t ending = 50;
     const timed all = run_in(3600, ending), some = run_in(0.75 * all.longest, ending);
@@ -152,7 +146,3 @@ START_TEST(the_end_of_a_step_has_its_time)
     ck_assert(some.iterations < all.iterations && some.iterations > 20);
     ck_assert_int_le(some.late, 2);
 }
-END_TEST
-
-SUITE("clock", steps_do_not_depend_on_the_clock, a_budget_on_a_jumping_clock_ends,
-      further_iterations_end_in_time, the_end_of_a_step_has_its_time)

@@ -109,12 +109,12 @@ static long count_steps(scene *s)
         drape_sim_energy(s->sim);
         counting = false;
     }
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, status);
     ck_assert_int_ge(drape_sim_statistics(s->sim).steps_accepted, 50);
     return calls;
 }
 
-START_TEST(the_counter_counts)
+TEST(the_counter_counts)
 {
     calls = live = 0;
     counting = true;
@@ -129,7 +129,6 @@ START_TEST(the_counter_counts)
     ck_assert_int_eq(live, COUNTS_HEAP ? 1 : 0);
     free(memory);
 }
-END_TEST
 
 /* A solver that falls back to another one keeps the analysis and factors of that one from the first fallback
  * on: 37 allocations with multifrontal, once. One leaked allocation per factorization would be at least
@@ -143,7 +142,7 @@ static void check_heap(const drape_linear_ops *linear, int i)
     bool damped = i % 2;
     snprintf(integrator, sizeof integrator, "'linear_solver': '%s', 'globalization': '%s'",
              linear->entry.name, globals[i / 2 % 3]);
-    scene s = open_scene(integrator, damped);
+    scoped_scene s = open_scene(integrator, damped);
     long n = count_steps(&s);
     ck_assert_msg(live <= (linear->borrows_heap ? FALLBACK_PIECES : 0), "%s: %ld pieces kept in 49 steps",
                   integrator, live);
@@ -152,23 +151,21 @@ static void check_heap(const drape_linear_ops *linear, int i)
     if (n > 0 && i == 0)
         printf("# %s: %ld heap calls in %lld factorisations\n", linear->entry.name, n,
                (long long)drape_sim_statistics(s.sim).factorizations);
-    scene_close(&s);
 }
 
-START_TEST(no_heap_call_from_the_second_step_on)
+TEST(no_heap_call_from_the_second_step_on)
 {
     for (int k = 0; drape_linears[k]; k++)
         for (int i = 0; i < 6; i++)
             check_heap(drape_linears[k], i);
 }
-END_TEST
 
 /* Explicit substeps with everything that moves nodes, and lists of near points that are rebuilt. */
-START_TEST(no_heap_call_of_verlet)
+TEST(no_heap_call_of_verlet)
 {
     static const char *const forms[] = {"position", "velocity"};
     for (int i = 0; i < 4; i++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 8, 'width': 0.8, "
             "'height': 0.7,"
             " 'transform': {'translate': [0, 0.3, 0]}},"
@@ -182,28 +179,24 @@ START_TEST(no_heap_call_of_verlet)
             " 'controller': {'type': '%s'}, 'duration': 1}",
             forms[i & 1], i & 2 ? 0 : 20, i & 2 ? "halving" : "stable");
         ck_assert_int_eq(count_steps(&s), 0);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Rejected steps make no heap calls either. */
-START_TEST(no_heap_call_in_rejected_steps)
+TEST(no_heap_call_in_rejected_steps)
 {
-    scene s = open_scene("'max_iterations': 2, 'globalization': 'none'", true);
+    scoped_scene s = open_scene("'max_iterations': 2, 'globalization': 'none'", true);
     long n = count_steps(&s);
     ck_assert_int_gt(drape_sim_statistics(s.sim).steps_rejected, 50);
     ck_assert_int_eq(n, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* With colliders: after the lists of contacts have grown, here in an earlier part of the run, nothing is
  * allocated. */
-START_TEST(no_heap_call_in_contact)
+TEST(no_heap_call_in_contact)
 {
     for (size_t k = 0; k < METHODS; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
             "'height': 0.3,"
             " 'transform': {'translate': [-0.14, 0.11, 0.16]}}, 'terms': ['stretch.edge', 'bend.hinge'],"
@@ -231,13 +224,11 @@ START_TEST(no_heap_call_in_contact)
         ck_assert_msg(calls == 0, "%s: %ld heap calls", methods[k], calls);
         free(x);
         free(v);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Frames, step log and checkpoints are written through buffers allocated earlier. */
-START_TEST(no_heap_call_for_output)
+TEST(no_heap_call_for_output)
 {
     static const char *const formats[] = {"npy", "obj", "ply", "vtp", "pc2", "glb"};
     static const char *const integrators[] = {"be", "ida", "bdf2"};
@@ -261,7 +252,6 @@ START_TEST(no_heap_call_for_output)
         ck_assert_int_eq(system(command), 0);
     }
 }
-END_TEST
 
 /* The same with several threads; the calls of the context's allocator are counted too. */
 static long own_calls;
@@ -280,20 +270,18 @@ static void own_release(void *user, void *memory)
     free(memory);
 }
 
-START_TEST(no_heap_call_of_threads)
+TEST(no_heap_call_of_threads)
 {
-    scene s = open_scene("'linear_solver': 'klu'", true);
-    drape_context_def def;
-    drape_sim_def sim_def;
-    drape_context *ctx = NULL;
-    drape_sim *sim = NULL;
-    drape_context_def_init(&def, sizeof def);
+    scoped_scene s = open_scene("'linear_solver': 'klu'", true);
+    drape_context_def def = context_def();
+    drape_sim_def two = sim_def();
+    scoped_context *ctx = NULL;
+    scoped_sim *sim = NULL;
     def.allocate = own_allocate;
     def.release = own_release;
     ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
-    drape_sim_def_init(&sim_def, sizeof sim_def);
-    sim_def.threads = 2;
-    ck_assert_int_eq(drape_sim_create(ctx, s.model, &sim_def, &sim), DRAPE_OK);
+    two.threads = 2;
+    ck_assert_int_eq(drape_sim_create(ctx, s.model, &two, &sim), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(sim, 0.01), DRAPE_OK);
     own_calls = calls = 0;
     counting = true;
@@ -302,12 +290,4 @@ START_TEST(no_heap_call_of_threads)
     ck_assert_int_eq(status, DRAPE_OK);
     ck_assert_int_eq(calls, 0);
     ck_assert_int_eq(own_calls, 0);
-    drape_sim_destroy(&sim);
-    drape_context_destroy(&ctx);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("heap", the_counter_counts, no_heap_call_from_the_second_step_on, no_heap_call_of_verlet,
-      no_heap_call_in_rejected_steps, no_heap_call_in_contact, no_heap_call_for_output,
-      no_heap_call_of_threads)

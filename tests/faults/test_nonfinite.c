@@ -46,34 +46,30 @@ static void check_fixed(host_fault kind, const char *reason)
     }
 }
 
-START_TEST(a_nan_force_stops_fixed_steps)
+TEST(a_nan_force_stops_fixed_steps)
 {
     check_fixed(HOST_NAN_FORCE, "nonfinite");
 }
-END_TEST
 
-START_TEST(an_infinite_force_stops_fixed_steps)
+TEST(an_infinite_force_stops_fixed_steps)
 {
     check_fixed(HOST_INFINITE_FORCE, "nonfinite");
 }
-END_TEST
 
-START_TEST(a_nan_hessian_stops_fixed_steps)
+TEST(a_nan_hessian_stops_fixed_steps)
 {
     check_fixed(HOST_NAN_HESSIAN, "singular");
 }
-END_TEST
 
-START_TEST(an_infinite_hessian_stops_fixed_steps)
+TEST(an_infinite_hessian_stops_fixed_steps)
 {
     check_fixed(HOST_INFINITE_HESSIAN, "singular");
 }
-END_TEST
 
 /* With a time budget: while no force is finite, steps of any size fail, and the cloth is held, at a nominal
  * step a call. Calls succeed, time goes on, and no state has a number that is not finite. Afterwards it falls
  * again. */
-START_TEST(a_budget_holds_the_cloth)
+TEST(a_budget_holds_the_cloth)
 {
     host_sim s = host_open("", "'type': 'halving'", true);
     drape_realtime report;
@@ -101,11 +97,10 @@ START_TEST(a_budget_holds_the_cloth)
     ck_assert(warned);
     host_close(&s);
 }
-END_TEST
 
 /* Pins that a host moves meanwhile take the cloth with them: at the end of each of these steps it has the
  * shape that it had, and the velocity of the pins. */
-START_TEST(cloth_that_is_held_goes_with_its_pins)
+TEST(cloth_that_is_held_goes_with_its_pins)
 {
     host_sim s = host_open("", "'type': 'halving'", true);
     const int32_t pins[2] = {0, 2}, nodes = drape_model_node_count(s.model);
@@ -131,11 +126,10 @@ START_TEST(cloth_that_is_held_goes_with_its_pins)
     }
     host_close(&s);
 }
-END_TEST
 
 /* A persistent fault ends the run, after as many attempts as there are halvings down to dt_min, in the state
  * before the step. */
-START_TEST(a_fault_that_stays_ends_the_run)
+TEST(a_fault_that_stays_ends_the_run)
 {
     static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
                                        HOST_INFINITE_HESSIAN};
@@ -159,10 +153,9 @@ START_TEST(a_fault_that_stays_ends_the_run)
                 host_close(&s);
             }
 }
-END_TEST
 
 /* on_failure "accept" accepts an unconverged step, but never one that is not finite. */
-START_TEST(accept_takes_no_nan)
+TEST(accept_takes_no_nan)
 {
     for (long n = 1; n <= EVALUATIONS; n++) {
         host_sim s = host_open(", 'on_failure': 'accept', 'max_iterations': 2, 'globalization': 'none'",
@@ -176,11 +169,10 @@ START_TEST(accept_takes_no_nan)
         host_close(&s);
     }
 }
-END_TEST
 
 /* The smallest allowed dt_min, as any number above 0 is allowed. The run still ends, even at t = 0, where a
  * step of any length changes the time. */
-START_TEST(a_tiny_dt_min_ends_too)
+TEST(a_tiny_dt_min_ends_too)
 {
     host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-30", true);
     host_watch(&s);
@@ -191,9 +183,3 @@ START_TEST(a_tiny_dt_min_ends_too)
     ck_assert_int_lt(s.attempts, 110);
     host_close(&s);
 }
-END_TEST
-
-SUITE("nonfinite", a_nan_force_stops_fixed_steps, an_infinite_force_stops_fixed_steps,
-      a_nan_hessian_stops_fixed_steps, an_infinite_hessian_stops_fixed_steps, a_budget_holds_the_cloth,
-      cloth_that_is_held_goes_with_its_pins, a_fault_that_stays_ends_the_run, accept_takes_no_nan,
-      a_tiny_dt_min_ends_too)

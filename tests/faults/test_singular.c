@@ -10,7 +10,7 @@ static host_sim open_singular(const char *integrator, const char *controller)
     return s;
 }
 
-START_TEST(fixed_stops_and_keeps_the_state)
+TEST(fixed_stops_and_keeps_the_state)
 {
     for (int setting = 0; setting < HOST_SETTINGS; setting++) {
         host_sim s = open_singular(host_settings[setting], "'type': 'fixed'");
@@ -34,9 +34,8 @@ START_TEST(fixed_stops_and_keeps_the_state)
         host_close(&s);
     }
 }
-END_TEST
 
-START_TEST(halving_finds_a_regular_one)
+TEST(halving_finds_a_regular_one)
 {
     for (int setting = 0; setting < HOST_SETTINGS; setting++) {
         host_sim s = open_singular(host_settings[setting], "'type': 'halving'");
@@ -51,6 +50,3 @@ START_TEST(halving_finds_a_regular_one)
         host_close(&s);
     }
 }
-END_TEST
-
-SUITE("singular", fixed_stops_and_keeps_the_state, halving_finds_a_regular_one)

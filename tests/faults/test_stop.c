@@ -53,10 +53,9 @@ static scene open_watched(double dt, double rate, watcher *w)
 static watcher reference(double dt, double rate, uint64_t *hash)
 {
     watcher w = {.at = -1};
-    scene s = open_watched(dt, rate, &w);
+    scoped_scene s = open_watched(dt, rate, &w);
     scene_advance(&s, STEPS * dt);
     *hash = drape_sim_hash(s.sim);
-    scene_close(&s);
     return w;
 }
 
@@ -69,7 +68,7 @@ static void check_stops(drape_event_kind kind, double dt, double rate)
     ck_assert_int_gt(events, 3);
     for (long at = 1; at <= events; at++) {
         watcher w = {.kind = kind, .at = at, .answer = DRAPE_RETRY_REJECTED};
-        scene s = open_watched(dt, rate, &w);
+        scoped_scene s = open_watched(dt, rate, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, STEPS * dt), DRAPE_E_STOPPED);
         ck_assert_msg(strstr(drape_context_message(s.ctx), "an observer asked to stop"), "%s",
                       drape_context_message(s.ctx));
@@ -88,44 +87,39 @@ static void check_stops(drape_event_kind kind, double dt, double rate)
                           kind == DRAPE_EVENT_ATTEMPT ? "attempt" : "frame", at, f, w.frame_time[f],
                           w.frame_y[f], whole.frame_y[f]);
         }
-        scene_close(&s);
     }
 }
 
-START_TEST(stops_at_a_step_and_goes_on)
+TEST(stops_at_a_step_and_goes_on)
 {
     check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 60);
     check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 100);
 }
-END_TEST
 
-START_TEST(stops_at_a_frame_and_goes_on)
+TEST(stops_at_a_frame_and_goes_on)
 {
     check_stops(DRAPE_EVENT_FRAME, 0.01, 60);
     check_stops(DRAPE_EVENT_FRAME, 0.01, 100);
     check_stops(DRAPE_EVENT_FRAME, 0.01, 370);
 }
-END_TEST
 
-START_TEST(a_negative_answer_is_returned_with_its_message)
+TEST(a_negative_answer_is_returned_with_its_message)
 {
     for (int kind = 0; kind < 2; kind++) {
         watcher w = {
             .kind = (drape_event_kind)kind, .at = 3, .answer = DRAPE_E_FILE, .message = "the disk\nis full"};
-        scene s = open_watched(0.01, 60, &w);
+        scoped_scene s = open_watched(0.01, 60, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_FILE);
         ck_assert_str_eq(drape_context_message(s.ctx), "the disk is full");
         ck_assert_double_eq_tol(drape_sim_time(s.sim), kind == DRAPE_EVENT_ATTEMPT ? 0.03 : 0.04, 1e-15);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A stop at a rejected attempt leaves the state before it. */
-START_TEST(stops_at_a_rejected_step)
+TEST(stops_at_a_rejected_step)
 {
     watcher w = {.kind = DRAPE_EVENT_ATTEMPT, .at = 1, .answer = DRAPE_RETRY_REJECTED};
-    scene s = scene_open(falling, 0.05, ", 'max_iterations': 1", "halving", 60.0);
+    scoped_scene s = scene_open(falling, 0.05, ", 'max_iterations': 1", "halving", 60.0);
     w.ctx = s.ctx;
     ck_assert_int_eq(drape_sim_observe(s.sim, watch, &w), DRAPE_OK);
     uint64_t start = drape_sim_hash(s.sim);
@@ -134,17 +128,15 @@ START_TEST(stops_at_a_rejected_step)
     ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 1);
     ck_assert_uint_eq(drape_sim_hash(s.sim), start);
     ck_assert_double_eq(drape_sim_time(s.sim), 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* Observers registered before the one that stops are notified, later ones are not. */
-START_TEST(observers_are_notified_in_order)
+TEST(observers_are_notified_in_order)
 {
     watcher before = {.at = -1},
             stops = {.kind = DRAPE_EVENT_ATTEMPT, .at = 4, .answer = DRAPE_RETRY_REJECTED},
             after = {.at = -1};
-    scene s = scene_open(falling, 0.01, "", "halving", 60.0);
+    scoped_scene s = scene_open(falling, 0.01, "", "halving", 60.0);
     ck_assert_int_eq(drape_sim_observe(s.sim, watch, &before), DRAPE_OK);
     ck_assert_int_eq(drape_sim_observe(s.sim, watch, &stops), DRAPE_OK);
     ck_assert_int_eq(drape_sim_observe(s.sim, watch, &after), DRAPE_OK);
@@ -152,9 +144,7 @@ START_TEST(observers_are_notified_in_order)
     ck_assert_int_eq(before.attempts, 4);
     ck_assert_int_eq(stops.attempts, 4);
     ck_assert_int_eq(after.attempts, 3);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Stops at a time, in every integrator ---- */
 
@@ -184,8 +174,7 @@ static drape_status stop_at_time(void *user, const drape_event *event)
 static scene open_integrator(const char *integrator, const char *controller, const char *more, timer *w)
 {
     scene s = scene_model(falling, 0.025, more, controller, 60.0);
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = integrator;
     scene_start(&s, &def);
     ck_assert_int_eq(drape_sim_observe(s.sim, stop_at_time, w), DRAPE_OK);
@@ -197,13 +186,13 @@ static scene open_integrator(const char *integrator, const char *controller, con
 static void check_time_stops(const char *integrator, const char *controller, const char *more)
 {
     timer never = {.stop = NAN};
-    scene whole = open_integrator(integrator, controller, more, &never);
+    scoped_scene whole = open_integrator(integrator, controller, more, &never);
     scene_advance(&whole, END);
     const uint64_t end = drape_sim_hash(whole.sim);
     const int64_t rejected = drape_sim_statistics(whole.sim).steps_rejected;
     for (double t = 0.01; t < END; t += 0.013) {
         timer w = {.stop = t};
-        scene s = open_integrator(integrator, controller, more, &w);
+        scoped_scene s = open_integrator(integrator, controller, more, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
         ck_assert(w.before < t && drape_sim_time(s.sim) >= t);
         ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
@@ -216,13 +205,11 @@ static void check_time_stops(const char *integrator, const char *controller, con
         scene_advance(&s, END);
         ck_assert_msg(drape_sim_hash(s.sim) == end, "%s, %s, stopped at %g s", integrator, controller, t);
         ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, rejected);
-        scene_close(&s);
     }
     ck_assert(!*more || rejected > 0);
-    scene_close(&whole);
 }
 
-START_TEST(every_integrator_stops_at_a_time_and_continues)
+TEST(every_integrator_stops_at_a_time_and_continues)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *ops = drape_integrators[i];
@@ -237,8 +224,3 @@ START_TEST(every_integrator_stops_at_a_time_and_continues)
         check_time_stops(ops->entry.name, "error", "");
     }
 }
-END_TEST
-
-SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_frame_and_goes_on,
-      a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
-      observers_are_notified_in_order, every_integrator_stops_at_a_time_and_continues)

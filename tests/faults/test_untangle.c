@@ -16,22 +16,21 @@ static const char scene[] =
     "'size': [0.1, 0.14, 0.1]}], 'self_contact': {'thickness': 0.002}, 'duration': 1}";
 
 /* Every allocation fails once; every seventh one also with all that follow. Then it succeeds. */
-START_TEST(memory_ends_anywhere)
+TEST(memory_ends_anywhere)
 {
     for (int stay = 0; stay < 2; stay++) {
-        failing_allocator memory = {0};
-        host h = open_scene(&memory, scene);
+        scoped_host h = open_scene(scene);
         const uint64_t hash = drape_sim_hash(h.sim);
-        const long live = memory.live;
+        const long live = h.memory->live;
         drape_status status = DRAPE_E_MEMORY;
         drape_untangling u;
         long n = 0;
         for (; status && n < 100000; n += stay ? 7 : 1) {
-            memory.fail_at = memory.calls + n + 1;
-            memory.stay_broken = stay;
+            h.memory->fail_at = h.memory->calls + n + 1;
+            h.memory->stay_broken = stay;
             status = drape_sim_untangle(h.sim, NULL, &u);
-            memory.fail_at = 0;
-            ck_assert_int_eq(memory.live, live);
+            h.memory->fail_at = 0;
+            ck_assert_int_eq(h.memory->live, live);
             if (!status)
                 break;
             ck_assert_msg(status == DRAPE_E_MEMORY, "%ld: %s", n, drape_context_message(h.ctx));
@@ -41,10 +40,8 @@ START_TEST(memory_ends_anywhere)
         }
         printf("# %ld allocations\n", n);
         ck_assert(n > 50 && u.clear && u.pairs_before > 0 && u.inside_before > 0);
-        close_scene(&h, &memory);
     }
 }
-END_TEST
 
 static bool cancel_at(void *user)
 {
@@ -53,19 +50,17 @@ static bool cancel_at(void *user)
 }
 
 /* The context's cancel function ends it between any two sweeps. */
-START_TEST(cancelled_anywhere)
+TEST(cancelled_anywhere)
 {
-    drape_context_def def;
-    drape_context *ctx = NULL;
-    drape_scene *parsed = NULL;
-    drape_model *model = NULL;
-    drape_sim *sim = NULL;
+    drape_context_def def = context_def();
+    scoped_context *ctx = NULL;
+    scoped_parsed *parsed = NULL;
+    scoped_model *model = NULL;
+    scoped_sim *sim = NULL;
     char text[2048];
     int left = 1 << 30, ended = 0;
     strcpy(text, scene);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
-    drape_context_def_init(&def, sizeof def);
+    quote(text);
     def.cancel = cancel_at;
     def.cancel_user = &left;
     ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
@@ -79,11 +74,4 @@ START_TEST(cancelled_anywhere)
         ck_assert(status == DRAPE_OK || (status == DRAPE_E_STOPPED && drape_sim_hash(sim) == hash));
     }
     ck_assert_int_gt(ended, 3);
-    drape_sim_destroy(&sim);
-    drape_model_destroy(&model);
-    drape_scene_destroy(&parsed);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("untangle", memory_ends_anywhere, cancelled_anywhere)

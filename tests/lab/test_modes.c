@@ -19,7 +19,7 @@ static drape_modes find(scene *s, int32_t count, bool buckling, double load_fact
     def.count = count;
     def.buckling = buckling;
     def.load_factor = load_factor;
-    ck_assert_msg(drape_sim_modes(s->sim, &def, &modes) == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_modes(s->sim, &def, &modes));
     ck_assert_int_eq(modes.count, count);
     return modes;
 }
@@ -51,14 +51,14 @@ static scene open_membrane(void)
  * mode with m != n is there twice; along either axis of the plane, springs of that axis have k in place
  * of T. Each of some ten operations that make an entry of K rounds, relative to the largest eigenvalue,
  * 8 k/m. */
-START_TEST(a_membrane_has_the_modes_of_its_lattice)
+TEST(a_membrane_has_the_modes_of_its_lattice)
 {
     static const struct {
         int m, n;
         bool in_plane;
     } expected[] = {{1, 1, false}, {1, 2, false}, {2, 1, false}, {2, 2, false}, {1, 3, false},
                     {3, 1, false}, {1, 1, true},  {1, 1, true},  {2, 3, false}, {3, 2, false}};
-    scene s = open_membrane();
+    scoped_scene s = open_membrane();
     drape_modes modes = find(&s, 10, false, 1);
     const double mass = 0.1 / 256, stiffness = 10, tension = stiffness * 0.1;
     for (int k = 0; k < 10; k++) {
@@ -75,14 +75,12 @@ START_TEST(a_membrane_has_the_modes_of_its_lattice)
     ck_assert_int_ge(modes.below, 10);
     drape_modes_free(&modes);
     ck_assert_ptr_null(modes.modes);
-    scene_close(&s);
 }
-END_TEST
 
 /* u_i'M u_j = 0, also of equal eigenvalues, and K u = value M u, with K by differences of forces. */
-START_TEST(modes_are_orthogonal_and_satisfy_the_equation)
+TEST(modes_are_orthogonal_and_satisfy_the_equation)
 {
-    scene s = open_membrane();
+    scoped_scene s = open_membrane();
     drape_modes modes = find(&s, 6, false, 1);
     const size_t n = 3 * (size_t)s.model->node_count;
     for (int a = 0; a < 6; a++)
@@ -114,9 +112,7 @@ START_TEST(modes_are_orthogonal_and_satisfy_the_equation)
     free(g);
     free(v);
     drape_modes_free(&modes);
-    scene_close(&s);
 }
-END_TEST
 
 /* A search may find an eigenvector of an equal pair only; the next finds the other. Of diag(1, 2, 2, 3 ...)
  * with known vectors e_0 and e_1, e_2 must be among the largest of 1/diag that are left. */
@@ -134,11 +130,11 @@ static void same(void *user, const double *x, double *y)
     memcpy(y, x, 60 * sizeof *y);
 }
 
-START_TEST(what_is_known_is_not_found_again)
+TEST(what_is_known_is_not_found_again)
 {
     double diagonal[60], known[2 * 60] = {0}, value[4], vector[4 * 60];
     int32_t found;
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     for (int i = 0; i < 60; i++)
         diagonal[i] = i < 2 ? 1 + i : i;
     known[0] = known[60 + 1] = 1;
@@ -151,15 +147,13 @@ START_TEST(what_is_known_is_not_found_again)
         ck_assert_double_eq_tol(fabs(vector[60 * k + k + 2]), 1, 1e-6);
         ck_assert_double_eq_tol(vector[60 * k] + vector[60 * k + 1], 0, 1e-12);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Without stiffness, and unstable ---- */
 
-START_TEST(a_free_sheet_has_six_motions_without_stiffness)
+TEST(a_free_sheet_has_six_motions_without_stiffness)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 9, 'rows': 9, 'width': 1, "
         "'height': 1}, 'material': {'young_modulus': 1e5, 'poisson_ratio': 0.3, 'thickness': 0.005, "
         "'areal_density': 0.1}, 'terms': ['stretch.cst', 'bend.midedge']}], 'gravity': [0, 0, 0], "
@@ -171,12 +165,10 @@ START_TEST(a_free_sheet_has_six_motions_without_stiffness)
         ck_assert(isinf(modes.modes[k].error) == (k < 6));
     }
     drape_modes_free(&modes);
-    scene_close(&s);
 }
-END_TEST
 
 /* The sim is as it was: its bits after a further step are those without the reading. */
-START_TEST(reading_modes_changes_nothing)
+TEST(reading_modes_changes_nothing)
 {
     static const char text[] =
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.5, 'height': "
@@ -186,7 +178,7 @@ START_TEST(reading_modes_changes_nothing)
         "'integrator': {'method': 'be', 'dt': 0.01}, 'duration': 1}";
     uint64_t hash[2];
     for (int reads = 0; reads < 2; reads++) {
-        scene s = scene_open("%s", text);
+        scoped_scene s = scene_open("%s", text);
         scene_advance(&s, 0.1);
         if (reads) {
             drape_modes modes = find(&s, 3, false, 1);
@@ -195,17 +187,15 @@ START_TEST(reading_modes_changes_nothing)
         }
         scene_advance(&s, 0.2);
         hash[reads] = drape_sim_hash(s.sim);
-        scene_close(&s);
     }
     ck_assert(hash[0] == hash[1]);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
-START_TEST(wrong_requests_are_refused)
+TEST(wrong_requests_are_refused)
 {
-    scene s = open_membrane();
+    scoped_scene s = open_membrane();
     drape_modes_def def, good;
     drape_modes modes;
     drape_modes_def_init(&good, sizeof good);
@@ -236,24 +226,20 @@ START_TEST(wrong_requests_are_refused)
                    "'terms': ['stretch.edge', {'type': 'air.added_mass', 'span': 1}], 'pins': [{'edge': "
                    "'top'}]}], 'duration': 1}");
     refuse(&s, good, DRAPE_E_ARGUMENT, "the mass matrix depends on the shape");
-    scene_close(&s);
 }
-END_TEST
 
 /* Slack cloth without bending has no stiffness across its plane: more equal modes than can be separated
  * are not reported as found. */
-START_TEST(too_many_equal_modes_are_a_failure)
+TEST(too_many_equal_modes_are_a_failure)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 12, 'rows': 12, 'width': 1, "
         "'height': 1}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.1}, "
         "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}]}], 'gravity': [0, 0, 0], 'duration': 1}");
     drape_modes_def def;
     drape_modes_def_init(&def, sizeof def);
     refuse(&s, def, DRAPE_E_SOLVER, "is not known");
-    scene_close(&s);
 }
-END_TEST
 
 static drape_status vibrations(drape_sim *sim)
 {
@@ -288,7 +274,7 @@ static drape_status path(drape_sim *sim)
 }
 
 /* Every allocation fails once: each failure is reported, and nothing leaks. */
-START_TEST(memory_that_fails_is_reported)
+TEST(memory_that_fails_is_reported)
 {
     static const struct {
         drape_status (*run)(drape_sim *sim);
@@ -329,24 +315,21 @@ START_TEST(memory_that_fails_is_reported)
             ck_assert_int_eq(memory.live, 0);
         }
 }
-END_TEST
 
 static bool stop(void *user)
 {
     return ++*(int *)user > 0;
 }
 
-START_TEST(a_search_can_be_cancelled)
+TEST(a_search_can_be_cancelled)
 {
     int calls = -1000000;
-    drape_context_def context;
-    drape_context_def_init(&context, sizeof context);
+    drape_context_def context = context_def();
     context.cancel = stop;
     context.cancel_user = &calls;
     scene s = {0}, like = open_membrane();
     ck_assert_int_eq(drape_context_create(&context, &s.ctx), DRAPE_OK);
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     ck_assert_int_eq(drape_sim_create(s.ctx, like.model, &def, &s.sim), DRAPE_OK);
     calls = -2; /* in the third product with the operator */
     drape_modes_def modes;
@@ -356,9 +339,3 @@ START_TEST(a_search_can_be_cancelled)
     drape_context_destroy(&s.ctx);
     scene_close(&like);
 }
-END_TEST
-
-SUITE("modes", a_membrane_has_the_modes_of_its_lattice, modes_are_orthogonal_and_satisfy_the_equation,
-      what_is_known_is_not_found_again, a_free_sheet_has_six_motions_without_stiffness,
-      reading_modes_changes_nothing, wrong_requests_are_refused, too_many_equal_modes_are_a_failure,
-      memory_that_fails_is_reported, a_search_can_be_cancelled)

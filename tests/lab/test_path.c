@@ -59,18 +59,16 @@ static scene open_truss(void)
     const drape_setting spring[] = {{"stiffness", STIFFNESS, NULL}};
     const drape_entry_def term = {"spring.structural", spring, 1};
     drape_mass_def mass;
-    drape_pin_def pin;
-    drape_cloth_def cloth;
-    drape_scene_def def;
+    drape_pin_def pin = pin_def();
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     scene s = scene_empty();
     drape_mass_def_init(&mass, sizeof mass);
     mass.nodes = apex;
     mass.node_count = 1;
     mass.mass = MASS;
-    drape_pin_def_init(&pin, sizeof pin);
     pin.nodes = held;
     pin.node_count = 4;
-    drape_cloth_def_init(&cloth, sizeof cloth);
     cloth.mesh.positions = x;
     cloth.mesh.node_count = 5;
     cloth.mesh.triangles = triangle;
@@ -83,11 +81,10 @@ static scene open_truss(void)
     cloth.pin_count = 1;
     cloth.masses = &mass;
     cloth.mass_count = 1;
-    drape_scene_def_init(&def, sizeof def);
     def.cloths = &cloth;
     def.cloth_count = 1;
     def.gravity[1] = -GRAVITY;
-    ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, drape_model_create(s.ctx, &def, &s.model));
     scene_start(&s, NULL);
     return s;
 }
@@ -109,17 +106,17 @@ static double limit_height(void)
 
 /* Along the path the factor rises to the first limit, falls to the second, at the opposite height, and rises
  * again. Residuals of 1e-8 of the largest force, 60 N in a bar, change the factor by 1e-6/(m g) at most. */
-START_TEST(a_truss_snaps_through)
+TEST(a_truss_snaps_through)
 {
     static trace t;
-    scene s = open_truss();
+    scoped_scene s = open_truss();
     const double limit = limit_height();
     drape_path_def def = define(&t);
     t.node = APEX;
     def.to = 2 * load_at(limit);
     def.step = 0.1 * load_at(limit);
     def.max_arc = 0.02;
-    ck_assert_msg(drape_sim_path(s.sim, &def) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, drape_sim_path(s.sim, &def));
     double highest = 0, lowest = 0;
     for (int k = 0; k < t.count; k++) {
         const double y = t.x[k][1];
@@ -138,16 +135,14 @@ START_TEST(a_truss_snaps_through)
     ck_assert(t.point[t.count - 1].factor == def.to && t.x[t.count - 1][1] < -limit);
     /* Steps of 0.02 m miss the limits, where the factor is a parabola, by less than a tenth. */
     ck_assert(highest > 0.9 * load_at(limit) && lowest < -0.9 * load_at(limit));
-    scene_close(&s);
 }
-END_TEST
 
 /* Load control ends at the first limit: steps are at last 1e-7 of the first one, and the factor is within the
  * 1e-6/(m g) above. */
-START_TEST(load_control_stops_at_a_limit)
+TEST(load_control_stops_at_a_limit)
 {
     static trace t;
-    scene s = open_truss();
+    scoped_scene s = open_truss();
     drape_path_def def = define(&t);
     t.node = APEX;
     def.to = 2 * load_at(limit_height());
@@ -158,9 +153,7 @@ START_TEST(load_control_stops_at_a_limit)
     const double reached = t.point[t.count - 1].factor / load_at(limit_height());
     ck_assert(reached > 0.999 && reached <= 1 + 1e-6 / load_at(limit_height()));
     ck_assert_double_eq(drape_sim_positions(s.sim)[3 * APEX + 1], t.x[t.count - 1][1]);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- A column ---- */
 
@@ -192,19 +185,19 @@ static double elastica(double aside)
 }
 
 /* The straight path buckles at 1; the branch is the elastica, on either side. 40 cells are within .5 %. */
-START_TEST(a_column_follows_the_elastica)
+TEST(a_column_follows_the_elastica)
 {
     for (int side = -1; side <= 1; side += 2) {
         static trace t;
         memset(&t, 0, sizeof t);
-        scene s = open_column();
+        scoped_scene s = open_column();
         drape_path_def def = define(&t);
         double farthest = 0;
         t.node = 40;
         def.to = 1.3;
         def.branch = side;
         def.max_arc = 0.05;
-        ck_assert_msg(drape_sim_path(s.sim, &def) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+        assert_ok(s.ctx, drape_sim_path(s.sim, &def));
         ck_assert_int_eq(t.switches, 1);
         ck_assert_int_eq(t.bifurcations, 0);
         bool switched = false;
@@ -221,21 +214,19 @@ START_TEST(a_column_follows_the_elastica)
             farthest = fmax(farthest, fabs(aside));
         }
         ck_assert(farthest > 0.6);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- A strip that has buckled between clamps, and is pushed back ---- */
 
 /* Its paths are a loop through asymmetric shapes, all unstable but near the two symmetric ones, at factors
  * within 57, which are hardly a step away from the paths of the symmetric shapes, whose factor grows without
  * bound. A correction that goes far from the direction of the prediction lands on one of them. */
-START_TEST(a_path_does_not_jump_to_another)
+TEST(a_path_does_not_jump_to_another)
 {
     static trace t;
     memset(&t, 0, sizeof t);
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 31, 'rows': 3, 'width': 1, "
         "'height': "
         "0.06}, 'material': {'young_modulus': 1200, 'poisson_ratio': 0, 'thickness': 0.01, 'areal_density': "
@@ -249,14 +240,12 @@ START_TEST(a_path_does_not_jump_to_another)
     def.step = 500;
     def.max_arc = 0.01;
     def.max_points = 50;
-    ck_assert_msg(drape_sim_path(s.sim, &def) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, drape_sim_path(s.sim, &def));
     ck_assert_int_eq(t.count, 50);
     ck_assert_int_ge(t.limits, 2);
     for (int k = 0; k < t.count; k++)
         ck_assert_msg(fabs(t.point[k].factor) < 60, "point %d: factor %g", k, t.point[k].factor);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
@@ -272,10 +261,10 @@ static drape_status enough(void *user, drape_sim *sim, const drape_path_point *p
     return point->number == 3;
 }
 
-START_TEST(wrong_requests_are_refused)
+TEST(wrong_requests_are_refused)
 {
     static trace t;
-    scene s = open_truss();
+    scoped_scene s = open_truss();
     drape_path_def def = define(&t);
     drape_path_def_init(NULL, sizeof def);
     ck_assert_int_eq(drape_sim_path(NULL, &def), DRAPE_E_ARGUMENT);
@@ -305,9 +294,7 @@ START_TEST(wrong_requests_are_refused)
                    "'gravity': [0, 0, 0], 'duration': 1}");
     ck_assert_int_eq(drape_sim_path(s.sim, &def), DRAPE_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "no load deforms"));
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Loads that vary in time, and a load without a potential ---- */
 
@@ -327,34 +314,32 @@ static drape_status keep_last(void *user, drape_sim *sim, const drape_path_point
 
 static void follow_strip(const char *load, double *x)
 {
-    scene s = scene_open(STRIP, load);
+    scoped_scene s = scene_open(STRIP, load);
     drape_path_def def;
     drape_path_def_init(&def, sizeof def);
     def.observer = keep_last;
     def.user = x;
-    ck_assert_msg(drape_sim_path(s.sim, &def) == DRAPE_OK, "%s", drape_context_message(s.ctx));
-    scene_close(&s);
+    assert_ok(s.ctx, drape_sim_path(s.sim, &def));
 }
 
 /* From the start, whatever a history is there, a path has the load of the scene: the bits of one without. */
-START_TEST(a_path_has_the_full_load)
+TEST(a_path_has_the_full_load)
 {
     double x[2][3 * STRIP_NODES];
     follow_strip("'type': 'load.line', 'edge': 'top', 'force': [0, 1, 0]", x[0]);
     follow_strip("'type': 'load.line', 'edge': 'top', 'force': [0, 1, 0], 'ramp': 3", x[1]);
     ck_assert_mem_eq(x[0], x[1], sizeof *x);
 }
-END_TEST
 
 /* Of a follower pressure on a strip with open sides the stiffness is not symmetric: the path ends at the
  * equilibrium that `static` finds, both to 1e-8 of the forces, 1e-7 of the size; modes are refused. */
-START_TEST(a_follower_pressure_has_a_path_and_no_modes)
+TEST(a_follower_pressure_has_a_path_and_no_modes)
 {
     static const char load[] = "'type': 'load.follower', 'pressure': 50";
     double x[3 * STRIP_NODES];
     drape_modes modes;
     follow_strip(load, x);
-    scene s = scene_open(STRIP, load);
+    scoped_scene s = scene_open(STRIP, load);
     scene_advance(&s, 1);
     for (int i = 0; i < 3 * STRIP_NODES; i++)
         ck_assert_double_eq_tol(x[i], scene_state(&s)->x[i], 1e-7);
@@ -367,10 +352,4 @@ START_TEST(a_follower_pressure_has_a_path_and_no_modes)
     def.load_factor = 0;
     s = scene_open(STRIP, load);
     ck_assert_int_eq(drape_sim_modes(s.sim, &def, &modes), DRAPE_E_ARGUMENT);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("path", a_path_has_the_full_load, a_follower_pressure_has_a_path_and_no_modes, a_truss_snaps_through,
-      load_control_stops_at_a_limit, a_column_follows_the_elastica, a_path_does_not_jump_to_another,
-      wrong_requests_are_refused)

@@ -22,11 +22,10 @@ static const drape_reference *find(const char *name)
 
 static drape_validation run(const drape_reference *reference, int index)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_validation v;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     ck_assert_int_eq(drape_validate(ctx, reference, index, NULL, NULL, &v), DRAPE_OK);
-    drape_context_destroy(&ctx);
     return v;
 }
 
@@ -39,7 +38,7 @@ static void check(const char *name, int index, drape_outcome outcome)
 }
 
 /* Digits from physics texts and from independent programs; all digits listed are correct. */
-START_TEST(expected_values_are_those_of_other_sources)
+TEST(expected_values_are_those_of_other_sources)
 {
     static const struct {
         const char *name;
@@ -64,10 +63,9 @@ START_TEST(expected_values_are_those_of_other_sources)
     ck_assert_double_eq_tol(drape_reference_expected(find("cusick_stiff"), 1), pow(0.4, 4) / 8,
                             0.25 * pow(0.4, 4) / 8);
 }
-END_TEST
 
 /* All cases in the suite `long`, else those that take no more than a second or two. */
-START_TEST(references_pass)
+TEST(references_pass)
 {
     for (int r = 0; complete_sweep() && drape_references[r]; r++)
         for (int i = 0; i < drape_references[r]->case_count; i++)
@@ -96,11 +94,10 @@ START_TEST(references_pass)
             if (quick[r].index == ALL || quick[r].index == i)
                 check(quick[r].name, i, DRAPE_OUTCOME_PASS);
 }
-END_TEST
 
 /* All fabrics of the table, so that a new one is checked as well: in the sample, each by one or two of the
  * tests. */
-START_TEST(every_fabric_gives_back_its_published_values)
+TEST(every_fabric_gives_back_its_published_values)
 {
     static const char *const tests[] = {"fabric", "fabric_weft", "fabric_tension", "fabric_shear", "hanging"};
     int fabrics = 0;
@@ -118,11 +115,10 @@ START_TEST(every_fabric_gives_back_its_published_values)
     for (int i = 0; i < draped->case_count; i++)
         ck_assert(drape_reference_expected(draped, i) > 0 && drape_reference_expected(draped, i) < 1);
 }
-END_TEST
 
 /* The stiffnesses that terms get from a fabric: published numbers, and substitutes for those not
  * published. */
-START_TEST(a_fabric_has_what_was_published)
+TEST(a_fabric_has_what_was_published)
 {
     const drape_fabric *jeans = NULL, *feng = &drape_fabrics[1];
     drape_woven tension, bending;
@@ -162,14 +158,12 @@ START_TEST(a_fabric_has_what_was_published)
     ck_assert_double_eq(tension.shear, 34.4);
     ck_assert_double_eq(tension.poisson, 0);
 }
-END_TEST
 
-START_TEST(hinges_show_their_model_error)
+TEST(hinges_show_their_model_error)
 {
     check("plate_hinges", 0, DRAPE_OUTCOME_DOCUMENTED);
     check("lateral_buckling_hinges", 0, DRAPE_OUTCOME_DOCUMENTED);
 }
-END_TEST
 
 static double one_per_cent_off(double parameter)
 {
@@ -182,7 +176,7 @@ static int broken_scene(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
     return snprintf(text, DRAPE_LAB_TEXT, "{'drape': 1}");
 }
 
-START_TEST(references_can_fail)
+TEST(references_can_fail)
 {
     drape_reference wrong = *find("rest_curvature");
     wrong.expected = one_per_cent_off;
@@ -193,7 +187,6 @@ START_TEST(references_can_fail)
     ck_assert_ptr_nonnull(strstr(v.message, "cloth"));
     ck_assert(isnan(v.obtained));
 }
-END_TEST
 
 static bool at_once(void *user)
 {
@@ -201,19 +194,17 @@ static bool at_once(void *user)
     return true;
 }
 
-START_TEST(a_case_can_be_cancelled)
+TEST(a_case_can_be_cancelled)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_validation v;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     ck_assert_int_eq(drape_validate(ctx, find("pendulum"), 0, at_once, NULL, &v), DRAPE_E_STOPPED);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(references_are_complete)
+TEST(references_are_complete)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     int count = 0;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     for (; drape_references[count]; count++) {
@@ -226,18 +217,11 @@ START_TEST(references_are_complete)
         ck_assert(!r->known || r->known_count == 1 || r->known_count == r->case_count);
         for (int i = 0; i < r->case_count; i++) {
             ck_assert(isfinite(drape_reference_expected(r, i)));
-            drape_scene *scene = NULL;
+            scoped_parsed *scene = NULL;
             ck_assert_int_gt(drape_reference_text(r, i, 1, text), 0);
             ck_assert_msg(!drape_scene_parse(ctx, text, "reference", &scene), "%s: %s", r->entry.name,
                           drape_context_message(ctx)); /* one that is cut short is not JSON */
-            drape_scene_destroy(&scene);
         }
     }
     ck_assert_int_ge(count, 12);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("references", expected_values_are_those_of_other_sources, references_pass,
-      every_fabric_gives_back_its_published_values, a_fabric_has_what_was_published,
-      hinges_show_their_model_error, references_can_fail, a_case_can_be_cancelled, references_are_complete)

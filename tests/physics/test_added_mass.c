@@ -29,7 +29,7 @@ enum { METHODS = sizeof methods / sizeof *methods, EXACT = 3 /* the first ones s
 /* A free sheet that begins to fall, turned by 0.5 about x: along its normal gravity moves the air, too, and
  * along the sheet it does not. One step gives that up to rounding: the forces of second order in the velocity
  * vanish where a method evaluates them at the start, and are 1e-4 of h g elsewhere. */
-START_TEST(apparent_mass)
+TEST(apparent_mass)
 {
     const double h = 1e-4, g = 9.81, n[3] = {0, cos(0.5), sin(0.5)}, t[3] = {0, -sin(0.5), cos(0.5)};
     for (int m = 0; m < METHODS; m++) {
@@ -38,17 +38,15 @@ START_TEST(apparent_mass)
         snprintf(members, sizeof members,
                  "'gravity': [0, %g, 0], 'integrator': {'method': '%s', 'dt': %g}, 'duration': 1", -g,
                  methods[m], h);
-        scene s = scene_open(SHEET, turn, "", "", members);
+        scoped_scene s = scene_open(SHEET, turn, "", "", members);
         scene_advance(&s, h);
         for (size_t i = 0; i < NODES; i++) {
             const double *v = drape_sim_velocities(s.sim) + 3 * i;
             assert_below(fabs(vec3_dot(v, n) + h * g * n[1] * MASS / (MASS + ADDED)), 2e-4 * h * g);
             assert_below(fabs(vec3_dot(v, t) + h * g * t[1]), 2e-4 * h * g);
         }
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* The sum of the forces of air at rest on a flat sheet at an angle of attack a, and their moment about its
  * centre. */
@@ -56,7 +54,7 @@ static void forces_at(double a, const char *wake, double sum[3], double *moment)
 {
     char air[128];
     snprintf(air, sizeof air, ", 'wind': [%.17g, %.17g, 0]%s", 3 * cos(a), 3 * sin(a), wake);
-    scene s = scene_open(SHEET, "", air, "", "'gravity': [0, 0, 0], 'duration': 1");
+    scoped_scene s = scene_open(SHEET, "", air, "", "'gravity': [0, 0, 0], 'duration': 1");
     const drape_state *state = scene_state(&s);
     double g[3 * NODES], centre[3] = {0};
     drape_system_force(s.sim->system,
@@ -69,7 +67,6 @@ static void forces_at(double a, const char *wake, double sum[3], double *moment)
     }
     for (size_t i = 0; i < 3 * NODES; i += 3)
         *moment -= (state->x[i] - centre[0]) * g[i + 1];
-    scene_close(&s);
 }
 
 /* Without its wake the air has no force on a flat sheet in steady wind, but Munk's moment m_a A U^2 sin a cos
@@ -77,7 +74,7 @@ static void forces_at(double a, const char *wake, double sum[3], double *moment)
  * normal, and half of tan a times that along the sheet, into the wind, times cos^2 a: of small a, Jones's
  * lift and induced drag, in sum m_a s U^2 a and half of that times a. Rounding: 40 triangles, about 100
  * operations each. */
-START_TEST(lift_and_moment)
+TEST(lift_and_moment)
 {
     const double angles[] = {0, 0.02, 0.3, 1.2};
     for (int k = 0; k < 4; k++) {
@@ -98,28 +95,28 @@ START_TEST(lift_and_moment)
         }
     }
 }
-END_TEST
 
 /* The first frequency of a clamped strip, 3.516 sqrt(B/(m + m_a)/L^4), by its first three passages through
  * rest. Of 20 edges the error is below half of (1.875/20)^2 = 0.9 %; that of trbdf2 with 200 steps a period
  * is far less. */
-START_TEST(frequency_in_still_air)
+TEST(frequency_in_still_air)
 {
     enum { STRIP = 63 };
     const double k = 1.8751040687, sigma = 0.7340955138, rigidity = 1e6 * 1e-9 / 12;
     for (int with = 0; with < 2; with++) {
         const double omega = k * k * sqrt(rigidity / (MASS + (with ? ADDED : 0))),
                      h = 8 * atan(1) / omega / 200;
-        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 21, 'rows': "
-                             "3, 'width': 1, 'height': "
-                             "0.1}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': "
-                             "1e-3, 'areal_density': "
-                             "0.2}, 'terms': ['stretch.cst', 'bend.midedge', {'type': 'air.added_mass', "
-                             "'span': %.17g}], 'pins': "
-                             "[{'edge': 'left', 'clamp': true}]}], 'gravity': [0, 0, 0], 'integrator': "
-                             "{'method': 'trbdf2', 'dt': "
-                             "%.17g, 'tolerance': 1e-13}, 'duration': 100}",
-                             with ? SPAN : 0.0, h);
+        scoped_scene s =
+            scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 21, 'rows': "
+                       "3, 'width': 1, 'height': "
+                       "0.1}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': "
+                       "1e-3, 'areal_density': "
+                       "0.2}, 'terms': ['stretch.cst', 'bend.midedge', {'type': 'air.added_mass', "
+                       "'span': %.17g}], 'pins': "
+                       "[{'edge': 'left', 'clamp': true}]}], 'gravity': [0, 0, 0], 'integrator': "
+                       "{'method': 'trbdf2', 'dt': "
+                       "%.17g, 'tolerance': 1e-13}, 'duration': 100}",
+                       with ? SPAN : 0.0, h);
         double v[3 * STRIP] = {0}, before = 0, zero = 0;
         ck_assert_int_eq(s.model->node_count, STRIP);
         size_t tip = 0;
@@ -143,10 +140,8 @@ START_TEST(frequency_in_still_air)
         }
         /* the velocity is that of cos(omega t) */
         assert_below(fabs(zero * omega / (10 * atan(1)) - 1), 4.5e-3);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- What is conserved ---- */
 
@@ -187,10 +182,10 @@ static scene open_free(const char *air, const char *method, double h)
 }
 
 /* A step changes the momentum by h times the residuals that it leaves, 90 of at most the tolerance. */
-START_TEST(momentum_is_conserved)
+TEST(momentum_is_conserved)
 {
     for (int m = 0; m < EXACT; m++) {
-        scene s = open_free(", 'wind': [2, 0.5, -1], 'wake': false", methods[m], 0.01);
+        scoped_scene s = open_free(", 'wind': [2, 0.5, -1], 'wake': false", methods[m], 0.01);
         double before[3], after[3];
         momentum_of(&s, before);
         scene_watch(&s);
@@ -200,10 +195,8 @@ START_TEST(momentum_is_conserved)
         for (int k = 0; k < 3; k++)
             assert_below(fabs(after[k] - before[k]),
                          0.5 * 3 * NODES * fmax(s.residual, 1e-12) + 1e-13 * MASS * 0.2);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* All of it moves with the pins of the track below. */
 static void set_carried(scene *s)
@@ -223,19 +216,18 @@ static double missed(const char *air, const char *cloth, const char *method, dou
              "'gravity': [0, 0, 0], 'integrator': {'method': '%s', 'dt': %.17g, 'tolerance': 1e-11}, "
              "'duration': 1",
              method, h);
-    scene s = scene_open(SHEET, "", air, cloth, members);
+    scoped_scene s = scene_open(SHEET, "", air, cloth, members);
     if (*cloth)
         set_carried(&s);
     else
         set_moving(&s);
     scene_advance(&s, 0.1);
     const double numerical = drape_sim_energy(s.sim).numerical;
-    scene_close(&s);
     return numerical;
 }
 
 /* Second-order methods miss an energy of second order: a quarter at half the step, or less. */
-START_TEST(account_of_energy)
+TEST(account_of_energy)
 {
     static const struct {
         const char *air, *cloth;
@@ -252,7 +244,6 @@ START_TEST(account_of_energy)
             assert_below(fabs(fine), 0.35 * fabs(coarse) + 1e-9);
         }
 }
-END_TEST
 
 /* ---- Integration ---- */
 
@@ -268,13 +259,13 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
 }
 
 /* The wind of a host is felt as that of the scene, its derivatives are exact, and its work is counted. */
-START_TEST(wind_of_a_host)
+TEST(wind_of_a_host)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
     int count = 0;
     double numerical[2];
     for (int k = 0; k < 2; k++) {
-        scene s = open_free("", "trbdf2", 1e-3 / (1 + k));
+        scoped_scene s = open_free("", "trbdf2", 1e-3 / (1 + k));
         ck_assert_int_eq(drape_sim_set_wind(s.sim, blow, NULL), DRAPE_OK);
         set_moving(&s);
         ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 5, rows, &count), DRAPE_OK);
@@ -282,36 +273,30 @@ START_TEST(wind_of_a_host)
             ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
         scene_advance(&s, 0.1);
         numerical[k] = drape_sim_energy(s.sim).numerical;
-        scene_close(&s);
     }
     assert_below(fabs(numerical[1]), 0.35 * fabs(numerical[0]));
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
 static void refused(const char *method, const char *cloth, const char *message)
 {
     char text[2048], members[256];
-    drape_scene *parsed = NULL;
-    drape_model *model = NULL;
     drape_sim *sim = NULL;
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
+    scoped_parsed *parsed = NULL;
+    scoped_model *model = NULL;
     snprintf(members, sizeof members, "'gravity': [0, 0, 0], 'integrator': {'method': '%s'}, 'duration': 1",
              method);
     snprintf(text, sizeof text, SHEET, "", "", cloth, members);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(text);
     ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
     ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
     ck_assert_int_eq(drape_sim_create(s.ctx, model, NULL, &sim), DRAPE_E_ARGUMENT);
     ck_assert_msg(strstr(drape_context_message(s.ctx), message), "%s", drape_context_message(s.ctx));
-    drape_scene_destroy(&parsed);
-    drape_model_destroy(&model);
-    scene_close(&s);
 }
 
-START_TEST(refusals)
+TEST(refusals)
 {
     static const char *const others[] = {"midpoint", "ida", "dirk", "radau", "rosenbrock", "verlet"};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
@@ -322,7 +307,3 @@ START_TEST(refusals)
             ", 'pins': [{'edge': 'left', 'normal': [0, 1, 0], 'track': [[0, [0, 0, 0]], [1, [0, 1, 0]]]}]",
             "the term \"air.added_mass\" has momentum, which is not stepped with supports that move");
 }
-END_TEST
-
-SUITE("added_mass", apparent_mass, lift_and_moment, frequency_in_still_air, momentum_is_conserved,
-      account_of_energy, wind_of_a_host, refusals)

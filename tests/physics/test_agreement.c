@@ -29,7 +29,7 @@ static scene hung(const char *integrator)
 
 static void agree(const char *one, const char *other)
 {
-    scene a = hung(one), b = hung(other);
+    scoped_scene a = hung(one), b = hung(other);
     const double spring = 0.866 * 50;
     double worst = 0;
     scene_watch(&a);
@@ -47,11 +47,9 @@ static void agree(const char *one, const char *other)
     assert_below(d, 0.1);
     assert_below(worst, drift_bound(&a, STEPS, STEP, a.residual + b.residual + noise) *
                             cosh(STEPS * sqrt(d / (1 - d))));
-    scene_close(&a);
-    scene_close(&b);
 }
 
-START_TEST(linear_solvers_agree)
+TEST(linear_solvers_agree)
 {
     for (int i = 0; drape_linears_names[i]; i++) {
         char other[64];
@@ -59,32 +57,28 @@ START_TEST(linear_solvers_agree)
         agree(", 'linear_solver': 'klu'", other);
     }
 }
-END_TEST
 
-START_TEST(line_search_and_full_steps_agree)
+TEST(line_search_and_full_steps_agree)
 {
     agree(", 'globalization': 'line_search'", ", 'globalization': 'none'");
     agree(", 'globalization': 'work'", ", 'globalization': 'line_search'");
 }
-END_TEST
 
 static uint64_t hash_after(const drape_sim_def *def, double t)
 {
-    scene s = hung("");
+    scoped_scene s = hung("");
     if (def) {
         drape_sim_destroy(&s.sim);
         scene_start(&s, def);
     }
     scene_advance(&s, t);
     const uint64_t hash = drape_sim_hash(s.sim);
-    scene_close(&s);
     return hash;
 }
 
-START_TEST(frames_do_not_change_a_bit)
+TEST(frames_do_not_change_a_bit)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.frame_rate = 7;
     const uint64_t seven = hash_after(&def, 0.5);
     def.frame_rate = 60;
@@ -92,26 +86,19 @@ START_TEST(frames_do_not_change_a_bit)
     def.frame_rate = 1013;
     ck_assert(hash_after(&def, 0.5) == seven);
 }
-END_TEST
 
 /* With dt = 1/240 s a sixtieth of a second is four steps. The ends k/60 and 4k/240 differ by round-off; the
  * schedule recognizes them as the same time: the steps are the same, and the states equal to the last bit. */
-START_TEST(one_advance_or_sixty)
+TEST(one_advance_or_sixty)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.dt = 1.0 / 240;
     const uint64_t at_once = hash_after(&def, 1);
-    scene s = hung("");
+    scoped_scene s = hung("");
     drape_sim_destroy(&s.sim);
     scene_start(&s, &def);
     for (int k = 1; k <= 60; k++)
         scene_advance(&s, k / 60.0);
     ck_assert(drape_sim_time(s.sim) == 1);
     ck_assert(drape_sim_hash(s.sim) == at_once);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("agreement", linear_solvers_agree, line_search_and_full_steps_agree, frames_do_not_change_a_bit,
-      one_advance_or_sixty)

@@ -86,10 +86,10 @@ static void wrap(scene *s, double kappa, double angle)
  * chords: for an arc s the height is wrong by the share (kappa s)^2/12 and the base by (kappa s)^2/6, s <=
  * l, so an angle by at most (kappa l)^2/4 of the largest, the energy by twice that; half the kappa l gives
  * a quarter of it. */
-START_TEST(rolled_sheet_has_the_energy_of_the_plate)
+TEST(rolled_sheet_has_the_energy_of_the_plate)
 {
     static const double angles[] = {0, 0.3, 0.5235987755982988, 1.1, 1.5707963267948966};
-    scene s = flat_grid();
+    scoped_scene s = flat_grid();
     for (size_t k = 0; k < sizeof angles / sizeof *angles; k++) {
         double error[2], uneven;
         for (int half = 0; half < 2; half++) {
@@ -105,15 +105,13 @@ START_TEST(rolled_sheet_has_the_energy_of_the_plate)
         if (error[1] > 1e-9)
             ck_assert_double_eq_tol(error[0] / error[1], 4, 4 * 0.05);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* A paraboloid y = 1/2 X.bX so shallow that slopes are below 1e-3: all is linear except for their squares. */
-START_TEST(double_curvature_has_the_energy_of_the_plate)
+TEST(double_curvature_has_the_energy_of_the_plate)
 {
     static const double bends[][3] = {{1, 0, 0}, {1, 1, 0}, {1, -1, 0}, {0, 0, 1}, {0.613, -0.241, 0.377}};
-    scene s = flat_grid();
+    scoped_scene s = flat_grid();
     for (size_t k = 0; k < sizeof bends / sizeof *bends; k++) {
         const double size = 5e-4, a = size * bends[k][0], b = size * bends[k][1], c = size * bends[k][2];
         const double exact = 0.5 * rigidity * ((a + b) * (a + b) - 8.0 / 3 * (a * b - c * c));
@@ -129,8 +127,4 @@ START_TEST(double_curvature_has_the_energy_of_the_plate)
         assert_below(fabs(hinge_density(&s, &uneven) / exact - 1), 4 * slope * slope);
         assert_below(uneven, 4 * slope * slope);
     }
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("bending", rolled_sheet_has_the_energy_of_the_plate, double_curvature_has_the_energy_of_the_plate)

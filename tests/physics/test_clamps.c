@@ -37,10 +37,10 @@ static scene strip(const char *method, const char *terms, double left, double ri
 
 /* Without loads a strip follows its clamp as a rigid body. The residual of 1e-11 N times the flexibility
  * L^3/(3 B w) = 1700 m/N bounds the displacement; ten times that for its nodes. */
-START_TEST(a_strip_turns_with_its_clamp)
+TEST(a_strip_turns_with_its_clamp)
 {
     const double angle = 130 * PI / 180;
-    scene s = strip("static", "'bend.midedge'", 130, 0, 1, 1, 0.2);
+    scoped_scene s = strip("static", "'bend.midedge'", 130, 0, 1, 1, 0.2);
     scene_advance(&s, 1);
     for (int32_t i = 0; i < s.model->node_count; i++) {
         const double *x = scene_state(&s)->x + 3 * i, *rest = s.model->rest + 3 * i,
@@ -50,9 +50,7 @@ START_TEST(a_strip_turns_with_its_clamp)
         ck_assert_double_lt(fabs(x[2] - rest[2]), 2e-7);
     }
     ck_assert_double_lt(drape_sim_energy(s.sim).elastic, 1e-16);
-    scene_close(&s);
 }
-END_TEST
 
 /* By every method the strip comes to the same place, and the work of the clamps, on springs and on dashpots,
  * is in the balance. The bending waves of 8 rows reach w = 600/s, that of the lowest 40/s: methods of second
@@ -60,15 +58,16 @@ END_TEST
  * w h/2 = 1 % of the low waves and all of the high ones, of those
  * that choose their steps, radau takes the longest, and the rule for the work has an error of their square
  * over 12. */
-START_TEST(the_work_of_clamps_that_turn_is_in_the_balance)
+TEST(the_work_of_clamps_that_turn_is_in_the_balance)
 {
     double reference = 0, dissipated = 0;
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *ops = drape_integrators[i];
         if (ops->steady_state)
             continue;
-        scene s = strip(ops->entry.name, "'bend.midedge', {'type': 'damp.kelvin_voigt', 'beta': 0.005}", 30,
-                        -30, 0.1, 5e-4, 0.2);
+        scoped_scene s =
+            strip(ops->entry.name, "'bend.midedge', {'type': 'damp.kelvin_voigt', 'beta': 0.005}", 30, -30,
+                  0.1, 5e-4, 0.2);
         scene_advance(&s, 0.12);
         const drape_energy e = drape_sim_energy(s.sim);
         const double whole = e.elastic + e.kinetic + e.dissipated, share = ops->own_steps ? 3e-3 : 0.02;
@@ -81,49 +80,43 @@ START_TEST(the_work_of_clamps_that_turn_is_in_the_balance)
             reference = e.elastic, dissipated = e.dissipated;
         ck_assert_msg(fabs(e.elastic / reference - 1) < 0.02, "%s: %g J", ops->entry.name, e.elastic);
         ck_assert_msg(fabs(e.dissipated / dissipated - 1) < 0.05, "%s: %g J", ops->entry.name, e.dissipated);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Rolled slowly, dashpots in parallel with the springs dissipate beta B kappa'^2 L w T, half of it at the
  * clamps; the inertia adds the kinetic energy of a start and a stop, m (w L/8)^2 8/15 = 0.6 % of that. */
-START_TEST(dashpots_at_clamps_feel_their_turning)
+TEST(dashpots_at_clamps_feel_their_turning)
 {
     static const char *const methods[] = {"be", "trbdf2", "ida", "radau", "rosenbrock"};
     const double rate = 60 * PI / 180 / length / 2;
     const double expected = 0.05 * rigidity() * rate * rate * length * width * 2;
     for (int i = 0; i < 5; i++) {
-        scene s = strip(methods[i], "'bend.midedge', {'type': 'damp.kelvin_voigt', 'beta': 0.05}", 30, -30, 2,
-                        0.02, 0.0005);
+        scoped_scene s = strip(methods[i], "'bend.midedge', {'type': 'damp.kelvin_voigt', 'beta': 0.05}", 30,
+                               -30, 2, 0.02, 0.0005);
         scene_advance(&s, 2.2);
         const double dissipated = drape_sim_energy(s.sim).dissipated;
         printf("# %s: %.8g J, expected %.8g\n", methods[i], dissipated, expected);
         ck_assert_msg(fabs(dissipated / expected - 1) < 0.015, "%s: %g, not %g J", methods[i], dissipated,
                       expected);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Friction between yarns slips while the strip is rolled and unrolled: once over the loop, 2 HB (2 kappa -
  * 2 kappa_f) over the area is dissipated beyond where it began. */
-START_TEST(yarns_slip_while_clamps_turn)
+TEST(yarns_slip_while_clamps_turn)
 {
-    scene s = strip("static", "{'type': 'bend.midedge', 'friction': 2, 'friction_curvature': 0.5}", 30, -30,
-                    1, 0.1, 0.2);
+    scoped_scene s = strip("static", "{'type': 'bend.midedge', 'friction': 2, 'friction_curvature': 0.5}", 30,
+                           -30, 1, 0.1, 0.2);
     const double curvature = 60 * PI / 180 / length, limit = 2 * rigidity();
     for (int k = 1; k <= 10; k++)
         scene_advance(&s, 0.1 * k);
     const double expected = limit * (curvature - 0.5) * length * width;
     ck_assert_double_lt(fabs(drape_sim_energy(s.sim).dissipated / expected - 1), 1e-6);
-    scene_close(&s);
 }
-END_TEST
 
-START_TEST(derivatives_while_clamps_turn)
+TEST(derivatives_while_clamps_turn)
 {
-    scene s =
+    scoped_scene s =
         strip("be", "'bend.midedge', {'type': 'damp.kelvin_voigt', 'beta': 0.01}", 90, -90, 1, 0.01, 0.2);
     drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
     int count = 0;
@@ -132,9 +125,4 @@ START_TEST(derivatives_while_clamps_turn)
     for (int i = 0; i < count; i++)
         ck_assert_msg(results[i].error < results[i].limit, "%s, %s: %g", results[i].term, results[i].what,
                       results[i].error);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("clamps", a_strip_turns_with_its_clamp, the_work_of_clamps_that_turn_is_in_the_balance,
-      dashpots_at_clamps_feel_their_turning, yarns_slip_while_clamps_turn, derivatives_while_clamps_turn)

@@ -46,7 +46,7 @@ static scene open_sheet(const char *format, ...)
  * meet the cloth by the same pairs, in the same order, and their points differ by rounding; guesses are put
  * aside by other rules, so that positions differ by what the tolerance leaves: 1e-9 N moves a node of 1e-3 kg
  * by 1e-10 m in a step. */
-START_TEST(rigid_motion_as_frames)
+TEST(rigid_motion_as_frames)
 {
     const frames_folder f = frames_folder_make();
     double force[2][3];
@@ -77,7 +77,6 @@ START_TEST(rigid_motion_as_frames)
     scene_close(&frames);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /*
  * A ball of cloth around a ball that grows by 2 % in 1 s: strain e in all directions of the surface. Its
@@ -86,7 +85,7 @@ END_TEST
  * scales as a whole. Nothing else takes energy but damping and what is left of motion: what the ball has
  * done is in the account.
  */
-START_TEST(ball_grows_in_a_ball_of_cloth)
+TEST(ball_grows_in_a_ball_of_cloth)
 {
     const frames_folder f = frames_folder_make();
     const double membrane = 1e5 * 1e-3 / (1 - 0.25), rest = 0.205;
@@ -123,7 +122,6 @@ START_TEST(ball_grows_in_a_ball_of_cloth)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Sends the ball, in its coordinates, to a size and a height. */
 static void send(scene *s, double seconds, double size, double height, const double *speed)
@@ -135,8 +133,7 @@ static void send(scene *s, double seconds, double size, double height, const dou
         v[i] = speed ? speed[i % 3] : 0;
         x[i] = size * x[i] + (i % 3 == 1 ? height : 0);
     }
-    ck_assert_msg(drape_sim_deform_collider(s->sim, 0, seconds, POINTS, x, speed ? v : NULL) == DRAPE_OK,
-                  "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_deform_collider(s->sim, 0, seconds, POINTS, x, speed ? v : NULL));
 }
 
 static scene open_host(const frames_folder *f)
@@ -148,7 +145,7 @@ static scene open_host(const frames_folder *f)
 /* A host that sends the points as the frames have them moves the cloth as they do: to rounding, since pieces
  * of the motion are the same straight lines. A checkpoint in the middle of a path goes on with the same
  * bits, and so does another number of threads. */
-START_TEST(host_sends_points)
+TEST(host_sends_points)
 {
     const frames_folder f = frames_folder_make();
     write_frames(&f, "up.npy", 3, (const double[]){0.2, 0.22, 0.2}, (const double[]){0, 0.05, 0.1});
@@ -156,8 +153,7 @@ START_TEST(host_sends_points)
                               " 'frame_rate': 10, 'friction': 0.3}",
                               f.path, f.path);
     scene host = open_host(&f), again = open_host(&f);
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.threads = 3;
     drape_sim_destroy(&again.sim);
     scene_start(&again, &def);
@@ -174,8 +170,7 @@ START_TEST(host_sends_points)
     snprintf(path, sizeof path, "%s/middle.drape", f.path);
     ck_assert_int_eq(drape_sim_save(host.sim, path), DRAPE_OK);
     scene restored = open_host(&f);
-    ck_assert_msg(drape_sim_restore(restored.sim, path) == DRAPE_OK, "%s",
-                  drape_context_message(restored.ctx));
+    assert_ok(restored.ctx, drape_sim_restore(restored.sim, path));
     scene_advance(&host, 0.2);
     scene_advance(&again, 0.2);
     scene_advance(&restored, 0.2);
@@ -199,11 +194,10 @@ START_TEST(host_sends_points)
     scene_close(&restored);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* A host that computes its times as k dt calls a rounding error after the end of the last path: the velocity
  * with which that ended goes on. */
-START_TEST(velocity_goes_on_from_frame_to_frame)
+TEST(velocity_goes_on_from_frame_to_frame)
 {
     const frames_folder f = frames_folder_make();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
@@ -220,10 +214,9 @@ START_TEST(velocity_goes_on_from_frame_to_frame)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* A rigid collider may take the place of one that a host has deformed. */
-START_TEST(a_rigid_body_takes_its_place)
+TEST(a_rigid_body_takes_its_place)
 {
     const frames_folder f = frames_folder_make();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
@@ -238,9 +231,8 @@ START_TEST(a_rigid_body_takes_its_place)
     scene_close(&rigid);
     frames_folder_remove(&f);
 }
-END_TEST
 
-START_TEST(faults_of_a_host)
+TEST(faults_of_a_host)
 {
     const frames_folder f = frames_folder_make();
     static double x[3 * POINTS], v[3 * POINTS];
@@ -295,11 +287,10 @@ START_TEST(faults_of_a_host)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* A body that turns inside out, here in its third frame, is refused with the file and the frame; an open
  * one has no inside. A number that is not finite is found in any frame. */
-START_TEST(later_frames_are_checked)
+TEST(later_frames_are_checked)
 {
     const frames_folder f = frames_folder_make();
     const struct {
@@ -309,8 +300,8 @@ START_TEST(later_frames_are_checked)
                  {-0.2, "true", NULL},
                  {NAN, "true", "frames.npy: frame 2: node 0 is at (nan, nan, nan) m"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        scene s = scene_empty();
-        drape_scene *parsed = NULL;
+        scoped_scene s = scene_empty();
+        scoped_parsed *parsed = NULL;
         char text[2048], collider[512];
         write_frames(&f, "frames.npy", 3, (const double[]){0.2, 0.2, cases[i].size},
                      (const double[]){0, 0, 0});
@@ -318,8 +309,7 @@ START_TEST(later_frames_are_checked)
                  "{'type': 'animated_mesh', 'file': '%s/frames.npy', 'mesh': '%s/ball.obj', 'open': %s}",
                  f.path, f.path, cases[i].open);
         snprintf(text, sizeof text, SHEET, collider);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
+        quote(text);
         ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
         const drape_status status = drape_scene_compile(parsed, &s.model);
         ck_assert_int_eq(status != DRAPE_OK, cases[i].message != NULL);
@@ -327,16 +317,13 @@ START_TEST(later_frames_are_checked)
             ck_assert_msg(strstr(drape_context_message(s.ctx), cases[i].message) &&
                               strstr(drape_context_message(s.ctx), "/colliders/0/file"),
                           "%s", drape_context_message(s.ctx));
-        drape_scene_destroy(&parsed);
-        scene_close(&s);
     }
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* The inside of a body that intersects itself: two balls of one mesh that overlap wind twice around what they
  * share. A bowl has no inside, but for those that say it is open. */
-START_TEST(inside_by_winding)
+TEST(inside_by_winding)
 {
     const frames_folder f = frames_folder_make();
     static double x[6 * POINTS];
@@ -363,17 +350,15 @@ START_TEST(inside_by_winding)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Rules of contact for rigid bodies are refused, with the reason. */
-START_TEST(verlet_is_refused)
+TEST(verlet_is_refused)
 {
     const frames_folder f = frames_folder_make();
-    drape_sim_def def;
+    drape_sim_def def = sim_def();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
     scene s = open_host(&f);
     drape_sim_destroy(&s.sim);
-    drape_sim_def_init(&def, sizeof def);
     def.integrator = "verlet";
     ck_assert_int_eq(drape_sim_create(s.ctx, s.model, &def, &s.sim), DRAPE_E_ARGUMENT);
     ck_assert_msg(
@@ -382,8 +367,3 @@ START_TEST(verlet_is_refused)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
-
-SUITE("deform", rigid_motion_as_frames, ball_grows_in_a_ball_of_cloth, host_sends_points,
-      velocity_goes_on_from_frame_to_frame, a_rigid_body_takes_its_place, faults_of_a_host,
-      later_frames_are_checked, inside_by_winding, verlet_is_refused)

@@ -149,7 +149,7 @@ static scene open_drop(const char *method, const struct target *on, double speed
         on->top + 0.03, -speed, on->text, method);
 }
 
-START_TEST(nothing_is_ever_inside)
+TEST(nothing_is_ever_inside)
 {
     folder_enter();
     folder_write("octahedron.obj", octahedron);
@@ -158,7 +158,7 @@ START_TEST(nothing_is_ever_inside)
         for (size_t k = 0; k < METHODS; k++) {
             if (!in_sample(i, k, 3))
                 continue;
-            scene s = open_drop(methods[k], &targets[i], 0.8);
+            scoped_scene s = open_drop(methods[k], &targets[i], 0.8);
             watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
             ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
             scene_advance(&s, 0.25);
@@ -171,20 +171,18 @@ START_TEST(nothing_is_ever_inside)
             ck_assert_int_eq(w.frames, 16);
             states = fmax(states, w.state);
             frames = fmax(frames, w.frame);
-            scene_close(&s);
         }
     folder_leave();
     assert_below(states, DEEPEST);
     assert_below(frames, DEEPEST);
 }
-END_TEST
 
 /* A ball that rises into a sheet held at its corners, and out of it again. */
-START_TEST(nothing_is_ever_inside_a_moving_collider)
+TEST(nothing_is_ever_inside_a_moving_collider)
 {
     const solid ball = {.round = true, .radius = 0.1};
     for (size_t k = 0; k <= METHODS; k++) { /* the last time "be" with states that have not converged */
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3,"
             " 'height': 0.3, 'transform': {'translate': [-0.147, 0.12, 0.155]}},"
             " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
@@ -204,15 +202,13 @@ START_TEST(nothing_is_ever_inside_a_moving_collider)
         ck_assert(w.state > -0.002); /* the ball reached the sheet */
         assert_below(w.state, DEEPEST);
         assert_below(w.frame, DEEPEST);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Starts that are not free ---- */
 
 /* The sheet begins on the top or 0.5 mm inside. It comes out and then stays outside. */
-START_TEST(what_begins_inside_comes_out)
+TEST(what_begins_inside_comes_out)
 {
     folder_enter();
     folder_write("octahedron.obj", octahedron);
@@ -222,7 +218,7 @@ START_TEST(what_begins_inside_comes_out)
                 continue;
             struct target on = targets[i];
             on.top -= 0.03 + (k < METHODS ? 0.0005 : 0);
-            scene s = open_drop(methods[k % METHODS], &on, 0);
+            scoped_scene s = open_drop(methods[k % METHODS], &on, 0);
             watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
             const double before = deepest(&w, drape_sim_positions(s.sim), 0);
             scene_advance(&s, 0.05);
@@ -232,11 +228,9 @@ START_TEST(what_begins_inside_comes_out)
             printf("# %s, %.20s: from %.3g m to %.3g m\n", methods[k % METHODS], on.text, before, after);
             ck_assert(k >= METHODS || before > 1e-4);
             assert_below(fmax(after, fmax(w.state, w.frame)), DEEPEST);
-            scene_close(&s);
         }
     folder_leave();
 }
-END_TEST
 
 /* ---- Cloth on itself ---- */
 
@@ -255,12 +249,13 @@ static scene open_fold(const char *method, const char *self)
 
 /* A strip dropped edge-on onto a floor folds onto itself; it passes through itself only without
  * self-contact. */
-START_TEST(a_fold_never_crosses_itself)
+TEST(a_fold_never_crosses_itself)
 {
     const solid floor = {.planes = 1, .plane = {{0, 1, 0, 0}}};
     for (size_t k = 0; k <= METHODS; k++) {
-        scene s = open_fold(methods[k % METHODS],
-                            k < METHODS ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}" : "");
+        scoped_scene s =
+            open_fold(methods[k % METHODS],
+                      k < METHODS ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}" : "");
         watch w = {.s = &s, .body = &floor, .state = -INFINITY, .frame = -INFINITY};
         drape_intersections found;
         int64_t without = 0;
@@ -280,18 +275,16 @@ START_TEST(a_fold_never_crosses_itself)
         else
             ck_assert_int_gt(without, 0);
         assert_below(fmax(w.state, w.frame), DEEPEST);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* The reported depth is that of the sheet without its thickness. One sheet is above the plane, the other
  * below it. */
-START_TEST(what_is_inside_a_collider_is_reported)
+TEST(what_is_inside_a_collider_is_reported)
 {
     static const double heights[] = {0.02, -0.01};
     for (int i = 0; i < 2; i++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, 'width': 0.3, "
             "'height': 0.2, "
             "'transform': {'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
@@ -303,18 +296,16 @@ START_TEST(what_is_inside_a_collider_is_reported)
         ck_assert_double_eq_tol(deepest, i ? 0.01 : 0, 1e-15);
         ck_assert_int_eq(drape_sim_inside(s.sim, 1, NULL), -1);
         ck_assert_int_eq(drape_sim_inside(s.sim, -1, NULL), -1);
-        scene_close(&s);
     }
     ck_assert_int_eq(drape_sim_inside(NULL, 0, NULL), -1);
 }
-END_TEST
 
 /* The rows of a tilted sheet land on a floor one after the other. If each pair halves its gap until the
  * barrier holds it, 6.2 iterations a step; where they arrive together, with predicted forces, 2.3. The bound
  * is between. */
-START_TEST(a_landing_takes_few_iterations)
+TEST(a_landing_takes_few_iterations)
 {
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 8, 'rows': 8, 'width': 2, "
                    "'height': 2, 'orientation': 'horizontal', 'transform': {'rotate': [1, 0, 0, 35]}}, "
                    "'material': {'young_modulus': 1e6, 'thickness': 5e-4, 'areal_density': 0.3}, "
@@ -326,9 +317,4 @@ START_TEST(a_landing_takes_few_iterations)
     const double mean = (double)done.newton_iterations / (double)done.steps_accepted;
     printf("# %.1f iterations a step, %lld rejected\n", mean, (long long)done.steps_rejected);
     ck_assert_double_lt(mean, 4);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("drop", a_landing_takes_few_iterations, what_is_inside_a_collider_is_reported, nothing_is_ever_inside,
-      nothing_is_ever_inside_a_moving_collider, what_begins_inside_comes_out, a_fold_never_crosses_itself)

@@ -41,22 +41,21 @@ static double lowest(const scene *s)
 /* Whether the method follows free fall exactly, up to rounding: seen by a run without events. */
 static bool is_exact(const char *name)
 {
-    scene s = fall(name, "[0, 0, 0]", "");
+    scoped_scene s = fall(name, "[0, 0, 0]", "");
     scene_advance(&s, 0.1);
     const double t = drape_sim_time(s.sim), error = lowest(&s) + GRAVITY / 2 * t * t;
-    scene_close(&s);
     return fabs(error) < 1e-13;
 }
 
 /* The state at a stop is one of the run, and the lowest node is at the height to 1e-10 s of its speed. With
  * methods that are exact on free fall that is the time of the formula. */
-START_TEST(free_fall_stops_at_its_height)
+TEST(free_fall_stops_at_its_height)
 {
     const double time = sqrt(2 * HEIGHT / GRAVITY), speed = GRAVITY * time;
     int exact = 0;
     for (int i = 0; method(i); i++) {
         const char *name = method(i)->entry.name;
-        scene s = fall(name, "[0, 0, 0]", "{'type': 'height', 'height': -0.7, 'action': 'stop'}");
+        scoped_scene s = fall(name, "[0, 0, 0]", "{'type': 'height', 'height': -0.7, 'action': 'stop'}");
         ck_assert_msg(drape_sim_advance(s.sim, 1) == DRAPE_E_STOPPED, "%s: %s", name,
                       drape_context_message(s.ctx));
         drape_event_record record;
@@ -71,15 +70,13 @@ START_TEST(free_fall_stops_at_its_height)
         }
         printf("# %s: %.3g s, %.3g m, %lld repeated\n", name, record.last - time, lowest(&s) + HEIGHT,
                (long long)drape_sim_statistics(s.sim).steps_rejected);
-        scene_close(&s);
     }
     ck_assert_int_ge(exact, 3); /* midpoint, trbdf2 and verlet */
 }
-END_TEST
 
 /* An event that is recorded where another one stops the run has its root at the same time, and is reported.
  */
-START_TEST(an_event_is_recorded_where_another_stops)
+TEST(an_event_is_recorded_where_another_stops)
 {
     for (int i = 0; method(i); i++)
         for (int k = 0; k < 6; k++) {
@@ -88,7 +85,7 @@ START_TEST(an_event_is_recorded_where_another_stops)
             snprintf(events, sizeof events,
                      "{'type': 'height', 'height': %g}, {'type': 'height', 'height': %g, 'action': 'stop'}",
                      -0.05 - 0.0137 * k, -0.05 - 0.0137 * k);
-            scene s = fall(name, "[0, 0, 0]", events);
+            scoped_scene s = fall(name, "[0, 0, 0]", events);
             ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STOPPED);
             drape_event_record recorded, stop;
             drape_sim_event(s.sim, 0, &recorded);
@@ -96,23 +93,21 @@ START_TEST(an_event_is_recorded_where_another_stops)
             ck_assert_msg(recorded.count == 1 && stop.count == 1, "%s %d: %d and %d times", name, k,
                           (int)recorded.count, (int)stop.count);
             ck_assert_double_le(fabs(recorded.last - stop.last), PROMISE);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* A recorded event is at the same time as far as dense output is exact. Where it is on free fall, so is its
  * kinetic energy, m g^2 t^2 / 2. */
-START_TEST(recorded_events_are_located_on_dense_output)
+TEST(recorded_events_are_located_on_dense_output)
 {
     for (int i = 0; method(i); i++) {
         const char *name = method(i)->entry.name;
         if (!is_exact(name))
             continue;
-        scene s = fall(name, "[0, 0, 0]",
-                       "{'type': 'height', 'height': -0.7, 'of': 'center'},"
-                       "{'type': 'plane', 'normal': [0, -2, 0], 'offset': 0.3, 'of': 'highest'},"
-                       "{'type': 'energy', 'bound': 0.01}");
+        scoped_scene s = fall(name, "[0, 0, 0]",
+                              "{'type': 'height', 'height': -0.7, 'of': 'center'},"
+                              "{'type': 'plane', 'normal': [0, -2, 0], 'offset': 0.3, 'of': 'highest'},"
+                              "{'type': 'energy', 'bound': 0.01}");
         double mass = 0;
         for (int32_t k = 0; k < s.model->node_count; k++)
             mass += s.model->mass[k];
@@ -127,10 +122,8 @@ START_TEST(recorded_events_are_located_on_dense_output)
                           record.last - times[k]);
         }
         ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 0);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- A swinging, pulled sheet above a floor ---- */
 
@@ -158,11 +151,11 @@ static const char watching[] = "{'type': 'height', 'height': -0.1, 'cloth': 'she
                                "{'type': 'pin_force', 'of': 'largest', 'limit': 0.6}";
 
 /* Evaluating forces and energies between steps leaves no trace, in contact and with damping. */
-START_TEST(recording_changes_no_bit)
+TEST(recording_changes_no_bit)
 {
     for (int i = 0; method(i); i++) {
         const char *name = method(i)->entry.name;
-        scene plain = swing(name, ""), watched = swing(name, watching);
+        scoped_scene plain = swing(name, ""), watched = swing(name, watching);
         int64_t found = 0;
         scene_advance(&plain, 0.6);
         scene_advance(&watched, 0.6);
@@ -172,11 +165,8 @@ START_TEST(recording_changes_no_bit)
         for (int k = 0; k < 6; k++)
             found += watched.sim->events.watches[k].count;
         ck_assert_msg(found >= 4, "%s: %lld events", name, (long long)found);
-        scene_close(&plain);
-        scene_close(&watched);
     }
 }
-END_TEST
 
 /* The function of an event in the present state. */
 static double at_stop(scene *s, int32_t event)
@@ -199,7 +189,7 @@ static double at_stop(scene *s, int32_t event)
  * functions that a host has, is 0 to what it changes in 1e-10 s, judged by the state 1e-4 s later. Steps that
  * are counted lead to the same bits as those of a host that advances to the time of the event, except with a
  * method that stops short of a tolerance, and begins its iterations from what an attempt left. */
-START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
+TEST(a_stop_is_a_state_of_the_run_at_the_root)
 {
     static const char *const stops[] = {
         "{'type': 'height', 'height': -0.1, 'cloth': 'sheet', 'node': 22, 'action': 'stop'}",
@@ -209,7 +199,7 @@ START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
     for (int i = 0; method(i); i++)
         for (int k = 0; k < 3; k++) {
             const char *name = method(i)->entry.name;
-            scene s = swing(name, stops[k]), plain = swing(name, "");
+            scoped_scene s = swing(name, stops[k]), plain = swing(name, "");
             ck_assert_msg(drape_sim_advance(s.sim, 1) == DRAPE_E_STOPPED, "%s %d: %s", name, k,
                           drape_context_message(s.ctx));
             const double t = drape_sim_time(s.sim), f = at_stop(&s, 0);
@@ -223,11 +213,8 @@ START_TEST(a_stop_is_a_state_of_the_run_at_the_root)
             printf("# %s %d: t = %.12g, f = %.3g, f / f' = %.3g s, %lld repeated\n", name, k, t, f, f / rate,
                    repeated);
             ck_assert_msg(fabs(f) <= PROMISE * rate, "%s %d: %g, %g a second", name, k, f, rate);
-            scene_close(&s);
-            scene_close(&plain);
         }
 }
-END_TEST
 
 typedef struct film {
     double x[3][75], v[75]; /* the last three frames, and the velocities of the one in the middle */
@@ -256,15 +243,15 @@ static drape_status save_at(void *user, const drape_event *event)
 
 /* Wherever it is saved, also while a step is repeated to end at an event and before that is reported, the
  * restored sim stops in the same state, with the same events. */
-START_TEST(a_restored_sim_has_the_same_events)
+TEST(a_restored_sim_has_the_same_events)
 {
     for (int i = 0; method(i); i++) {
         const char *name = method(i)->entry.name;
-        scene whole = swing(name, stopping);
+        scoped_scene whole = swing(name, stopping);
         ck_assert_int_eq(drape_sim_advance(whole.sim, 1), DRAPE_E_STOPPED);
         const int attempts = (int)whole.sim->attempts;
         for (int k = 0; k < attempts; k += k < attempts - 6 ? 1 + attempts / 6 : 1) {
-            scene s = swing(name, stopping), restored = swing(name, stopping);
+            scoped_scene s = swing(name, stopping), restored = swing(name, stopping);
             saver keeper = {.attempt = k};
             drape_sim_observe(s.sim, save_at, &keeper);
             ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STOPPED);
@@ -280,13 +267,9 @@ START_TEST(a_restored_sim_has_the_same_events)
                 ck_assert_msg(a.count == b.count && (a.count == 0 || a.last == b.last), "%s %d", name, k);
             }
             free(keeper.saved.data);
-            scene_close(&s);
-            scene_close(&restored);
         }
-        scene_close(&whole);
     }
 }
-END_TEST
 
 /* ---- Releasing pins ---- */
 
@@ -311,11 +294,11 @@ static const char tears[] = "{'type': 'pin_force', 'pins': 'pulled', 'limit': 0.
 /* The same scene without the pin goes on from the state in which the event stops a run. */
 static void check_release(const char *name)
 {
-    scene s = hung(name, both, tears),
-          stopped = hung(name, both,
-                         "{'type': 'pin_force', 'pins': 'pulled',"
-                         " 'limit': 0.4, 'action': 'stop'}"),
-          without = hung(name, one, "");
+    scoped_scene s = hung(name, both, tears),
+                 stopped = hung(name, both,
+                                "{'type': 'pin_force', 'pins': 'pulled',"
+                                " 'limit': 0.4, 'action': 'stop'}"),
+                 without = hung(name, one, "");
     ck_assert_int_eq(drape_sim_advance(stopped.sim, 0.4), DRAPE_E_STOPPED);
     const double t = drape_sim_time(stopped.sim);
     const int32_t node = stopped.model->moved_node[0];
@@ -338,26 +321,22 @@ static void check_release(const char *name)
     ck_assert(record.count == 1 && record.last == t);
     const double to[3] = {0, 0, 0};
     ck_assert_int_eq(drape_sim_move_pins(s.sim, 1, &node, 0.1, to, NULL), DRAPE_E_ARGUMENT);
-    scene_close(&s);
-    scene_close(&stopped);
-    scene_close(&without);
 }
 
 /* After the release the run is that of a scene without the pin, started from the state of the event: every
  * bit of it. */
-START_TEST(a_released_pin_is_gone)
+TEST(a_released_pin_is_gone)
 {
     for (int i = 0; method(i); i++)
         check_release(method(i)->entry.name);
 }
-END_TEST
 
 /* The sheet is let go as a whole, while a host pushes it upwards by half of its weight: the center of mass
  * then falls at g/2 from where and as fast as it was, with nothing lost: the masses of released nodes are
  * part of it. Counts go on. */
-START_TEST(a_sheet_that_is_let_go_falls)
+TEST(a_sheet_that_is_let_go_falls)
 {
-    scene s = hung("midpoint", both, "{'type': 'energy', 'bound': 0.01, 'action': 'release'}");
+    scoped_scene s = hung("midpoint", both, "{'type': 'energy', 'bound': 0.01, 'action': 'release'}");
     double lift[75] = {0};
     for (size_t i = 0; i < 25; i++)
         lift[3 * i + 1] = s.model->mass[i] * GRAVITY / 2;
@@ -389,9 +368,7 @@ START_TEST(a_sheet_that_is_let_go_falls)
     const drape_statistics after = drape_sim_statistics(s.sim);
     ck_assert(after.steps_accepted > before.steps_accepted + 30 &&
               after.newton_iterations > before.newton_iterations + 30);
-    scene_close(&s);
 }
-END_TEST
 
 static const char falls[] =
     "{'type': 'height', 'height': -0.1, 'node': 22, 'action': 'release', 'pins': 'held'},"
@@ -399,11 +376,11 @@ static const char falls[] =
 
 /* In contact, with friction and damping: a checkpoint from before, during and after the release leads to the
  * same end, in a sim of the scene's own model. */
-START_TEST(a_release_is_in_checkpoints)
+TEST(a_release_is_in_checkpoints)
 {
     for (int i = 0; method(i); i++) {
         const char *name = method(i)->entry.name;
-        scene s = swing(name, falls);
+        scoped_scene s = swing(name, falls);
         bytes saved[4];
         for (int k = 0; k < 4; k++) {
             scene_advance(&s, (double[]){0.2, 0.35, 0.5, 0.55}[k]);
@@ -414,9 +391,8 @@ START_TEST(a_release_is_in_checkpoints)
         for (int k = 0; k < 4; k++) {
             if (!in_sample((size_t)i, (size_t)k, 2))
                 continue;
-            scene other = swing(name, falls);
-            ck_assert_msg(drape_sim_restore_from(other.sim, saved[k].data, saved[k].size) == DRAPE_OK, "%s",
-                          drape_context_message(other.ctx));
+            scoped_scene other = swing(name, falls);
+            assert_ok(other.ctx, drape_sim_restore_from(other.sim, saved[k].data, saved[k].size));
             for (int m = k + 1; m < 4; m++)
                 scene_advance(&other, (double[]){0.2, 0.35, 0.5, 0.55}[m]);
             scene_advance(&other, 0.6);
@@ -426,16 +402,8 @@ START_TEST(a_release_is_in_checkpoints)
             /* and back to a sim in which nothing was released */
             ck_assert_int_eq(drape_sim_restore_from(other.sim, saved[0].data, saved[0].size), DRAPE_OK);
             ck_assert(drape_sim_model(other.sim) == other.model);
-            scene_close(&other);
         }
         for (int k = 0; k < 4; k++)
             free(saved[k].data);
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("events", free_fall_stops_at_its_height, an_event_is_recorded_where_another_stops,
-      recorded_events_are_located_on_dense_output, recording_changes_no_bit,
-      a_stop_is_a_state_of_the_run_at_the_root, a_restored_sim_has_the_same_events, a_released_pin_is_gone,
-      a_sheet_that_is_let_go_falls, a_release_is_in_checkpoints)

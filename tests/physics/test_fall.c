@@ -100,10 +100,10 @@ static double largest(const double *a, size_t n)
  * node, beta D-like k_b (4/H)^2, H >= L/2 here. The same speeds along the strain give forces of beta K v:
  * the last assertion shows that the test would detect them.
  */
-START_TEST(turning_cloth_does_not_feel_its_damping)
+TEST(turning_cloth_does_not_feel_its_damping)
 {
     enum { NODES = (EDGES + 1) * (EDGES + 1) };
-    scene s = sheet(damping, 0, "[0, 0, 0]");
+    scoped_scene s = sheet(damping, 0, "[0, 0, 0]");
     double bent[3 * NODES], x0[3 * NODES], x1[3 * NODES], v[3 * NODES], g[3 * NODES], history[256];
     const double omega = 5, speed = omega * 1.0; /* nodes are within 1 m of the axis */
     const double bending = 2 / sqrt(3.0) * MODULUS * pow(THICKNESS, 3) / 12 * 9 / 8;
@@ -136,16 +136,14 @@ START_TEST(turning_cloth_does_not_feel_its_damping)
         v[i] = i % 3 == 0 ? omega * x0[i] : 0; /* a stretching */
     drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, g);
     ck_assert(largest(g, 3 * NODES) > 0.1 * BETA * spring * omega * LENGTH);
-    scene_close(&s);
 }
-END_TEST
 
 /* P' = sum of residuals: besides M g t, n steps change the momentum by at most n h nodes r in each
  * direction. */
-START_TEST(linear_momentum_is_conserved)
+TEST(linear_momentum_is_conserved)
 {
     const int steps = 40;
-    scene s = sheet(damping, GRAVITY, "[0.3, -0.2, 0.1]");
+    scoped_scene s = sheet(damping, GRAVITY, "[0.3, -0.2, 0.1]");
     double before[3], after[3];
     shake(&s, 0.1 * LENGTH, 1);
     scene_watch(&s);
@@ -156,16 +154,14 @@ START_TEST(linear_momentum_is_conserved)
     const double r = s.residual + (1 + BETA / STEP) * force_noise(spring, 1.5);
     for (int k = 0; k < 3; k++)
         assert_below(fabs(after[k] - before[k]), s.accepted * STEP * s.model->node_count * r);
-    scene_close(&s);
 }
-END_TEST
 
 /* L1 = L0 + h sum m v1 x v0, since x1 x v1 = x1 x v0 + x1 x (v1 - v0), x1 = x0 + h v1, and internal forces
  * have no moment about any point. Residuals add h sum x1 x r: 2 h size nodes r. */
-START_TEST(angular_momentum_of_backward_euler)
+TEST(angular_momentum_of_backward_euler)
 {
     const int steps = 40;
-    scene s = sheet(damping, 0, "[0.3, -0.2, 0.1]");
+    scoped_scene s = sheet(damping, 0, "[0.3, -0.2, 0.1]");
     enum { NODES = (EDGES + 1) * (EDGES + 1) };
     double v0[3 * NODES], l0[3], l1[3], cross[3], worst = 0, change = 0;
     shake(&s, 0.1 * LENGTH, 1);
@@ -185,9 +181,4 @@ START_TEST(angular_momentum_of_backward_euler)
     const double r = s.residual + (1 + BETA / STEP) * force_noise(spring, 1.5);
     assert_below(worst, 2 * STEP * 1.5 * NODES * r);
     ck_assert(change > 1e3 * worst); /* it is not conserved: the term matters */
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("fall", turning_cloth_does_not_feel_its_damping, linear_momentum_is_conserved,
-      angular_momentum_of_backward_euler)

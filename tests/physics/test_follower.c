@@ -37,7 +37,7 @@ static void force_of(const scene *s, double *g)
 
 /* On a bent cloth with open edges all forces add up to p times the vector area, to rounding of p A; and on
  * nodes inside they are those of load.pressure, to rounding of p |X|^2. */
-START_TEST(the_resultant_is_pressure_times_area)
+TEST(the_resultant_is_pressure_times_area)
 {
     scene s = scene_open(CURVED, "load.follower"), c = scene_open(CURVED, "load.pressure");
     double g[2][3 * 42] = {{0}}, area[3], sum[3] = {0};
@@ -53,15 +53,14 @@ START_TEST(the_resultant_is_pressure_times_area)
         ck_assert_double_eq_tol(sum[k], PRESSURE * area[k], 64 * DBL_EPSILON * PRESSURE);
     scene_close(&s), scene_close(&c);
 }
-END_TEST
 
 /* A square membrane, pinned all round, carries the pressure on the area of its rim, 0.3 m x 0.3 m,
  * whatever its shape: to the residual of the nodes inside, 1e-9 N each here. load.pressure, with its apex
  * in the plane of the rim, leaves the rim a third of the pressure on the triangles at it: it does not. */
-START_TEST(a_rim_carries_pressure_times_area)
+TEST(a_rim_carries_pressure_times_area)
 {
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.3, "
             "'height': "
             "0.3}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': "
@@ -83,17 +82,15 @@ START_TEST(a_rim_carries_pressure_times_area)
             ck_assert(sqrt(size) < 0.99 * PRESSURE * 0.09);
         else
             ck_assert_double_eq_tol(sqrt(size), PRESSURE * 0.09, 81e-9);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A strip of length L between two pinned ends, its sides open, is inflated to an arc of radius R and half
  * angle a, stretched l = a/sin a: R = L/(2 sin a), and with Green's strain the tension E h (l^2 - 1)/2 l
  * is p R (nu = 0). Chords of n segments are shorter than the arc by (a/n)^2/6 of its excess; with 24 of
  * them and a = 0.6 that is 1e-4 of the height, and bending, over sqrt(D/N) = 2 mm at the ends, 1e-3: 0.3 %
  * in all. The sides are as high as the middle, to the same. */
-START_TEST(a_strip_with_open_sides_is_an_arc)
+TEST(a_strip_with_open_sides_is_an_arc)
 {
     static const char *const methods[] = {"static", "be"};
     double low = 1e-3, high = 1.5;
@@ -103,16 +100,17 @@ START_TEST(a_strip_with_open_sides_is_an_arc)
     }
     const double height = (1 - cos(low)) / (2 * sin(low));
     for (int m = 0; m < 2; m++) {
-        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 25, 'rows': 4, "
-                             "'width': 1, 'height': "
-                             "0.12}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': "
-                             "1e-3, 'areal_density': "
-                             "0.2}, 'terms': ['stretch.cst', 'bend.midedge', {'type': 'load.follower', "
-                             "'pressure': 50}], 'pins': "
-                             "[{'edge': 'left'}, {'edge': 'right'}]}], 'gravity': [0, 0, 0], 'integrator': "
-                             "{'method': '%s', 'dt': "
-                             "0.05}, 'duration': 3}",
-                             methods[m]);
+        scoped_scene s =
+            scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 25, 'rows': 4, "
+                       "'width': 1, 'height': "
+                       "0.12}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': "
+                       "1e-3, 'areal_density': "
+                       "0.2}, 'terms': ['stretch.cst', 'bend.midedge', {'type': 'load.follower', "
+                       "'pressure': 50}], 'pins': "
+                       "[{'edge': 'left'}, {'edge': 'right'}]}], 'gravity': [0, 0, 0], 'integrator': "
+                       "{'method': '%s', 'dt': "
+                       "0.05}, 'duration': 3}",
+                       methods[m]);
         scene_advance(&s, 3);
         for (int row = 0; row < 4; row++) {
             const double *x = scene_state(&s)->x + 3 * (25 * row + 12);
@@ -121,10 +119,5 @@ START_TEST(a_strip_with_open_sides_is_an_arc)
             printf("# %s, row %d: %.6g of %.6g m\n", methods[m], row, up, height);
             ck_assert_double_eq_tol(up, height, 3e-3 * height);
         }
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("follower", the_resultant_is_pressure_times_area, a_rim_carries_pressure_times_area,
-      a_strip_with_open_sides_is_an_arc)

@@ -125,7 +125,7 @@ static double error_velocity(const scene *s)
  * exp(-t/tau), tau = eps/(2 mu g cos a (1 - y)) = 0.15 to 1.1 ms; 100 ms at 1 ms leave (1/(1 + h/tau))^100
  * with be, 0.55^100 with midpoint: nothing. A residual r is an error r/(m g cos a mu f'/eps) of the
  * velocity. */
-START_TEST(sticks_but_for_its_creep)
+TEST(sticks_but_for_its_creep)
 {
     static const double shares[] = {0.5, 0.99};
     for (size_t k = 0; k < METHODS; k++)
@@ -135,7 +135,7 @@ START_TEST(sticks_but_for_its_creep)
                                .mu = 0.5,
                                .slope = 0.5 * shares[i % 2],
                                .contact = i / 2 ? ", 'friction': 'lagged'" : ""};
-            scene s = open_sliding(&p);
+            scoped_scene s = open_sliding(&p);
             const double y = 1 - sqrt(1 - p.slope / p.mu), weight = GRAVITY / hypot(1, p.slope);
             const double slope = scene_min_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
             /* residuals also tilt the sheet and change its gap: an error of the normal force of the same
@@ -147,10 +147,8 @@ START_TEST(sticks_but_for_its_creep)
             printf("# %s, tan a / mu = %g%s: creep %.9g of %.9g m/s\n", p.method, p.slope / p.mu, p.contact,
                    v, y * EPS);
             assert_below(fabs(v - y * EPS), bound);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* ---- How far it slides ---- */
 
@@ -165,7 +163,7 @@ static double slide_by_recurrence(const char *method, double v0, double a, doubl
     return strcmp(method, "bdf2") == 0 ? exact - 0.75 * a * h * h * (1 - pow(3, -n)) : exact;
 }
 
-START_TEST(slides_as_far_as_it_should)
+TEST(slides_as_far_as_it_should)
 {
     const int n = 25;
     for (size_t k = 0; k < METHODS; k++)
@@ -176,7 +174,7 @@ START_TEST(slides_as_far_as_it_should)
                                .velocity = 1,
                                .contact = lagged ? ", 'friction': 'lagged'" : ""};
             const double a = p.mu * GRAVITY, wanted = slide_by_recurrence(p.method, p.velocity, a, p.dt, n);
-            scene s = open_sliding(&p);
+            scoped_scene s = open_sliding(&p);
             const double before = drape_sim_energy(s.sim).kinetic, m = mass_of(&s);
             const double got = slide_of(&p, &s, n * p.dt);
             const drape_energy e = drape_sim_energy(s.sim);
@@ -192,10 +190,8 @@ START_TEST(slides_as_far_as_it_should)
             const double own = strcmp(p.method, "be") == 0 ? n * m * a * a * p.dt * p.dt / 2 : 0;
             if (k == 0 || strcmp(p.method, "midpoint") == 0)
                 assert_below(fabs(e.numerical - own), 1e-6 * before);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* ---- Moving colliders ---- */
 
@@ -203,7 +199,7 @@ END_TEST
  * when they have the same velocity, and then only the decay of the smoothing is left, at most 0.66 a step
  * with midpoint. The plate's work is m U^2, half of it heat. Midpoint's audit agrees except for the step in
  * which sliding ends, which may slide by an h too far or not far enough: (a h/U)^2. */
-START_TEST(a_plate_carries_the_sheet)
+TEST(a_plate_carries_the_sheet)
 {
     const double speed = 0.2, t = 0.1;
     for (size_t k = 0; k < METHODS; k++) {
@@ -211,7 +207,7 @@ START_TEST(a_plate_carries_the_sheet)
                            .dt = 1e-3,
                            .mu = 0.5,
                            .collider = ", 'track': [[0, [0,0,0]], [1, [0.2,0,0]]]"};
-        scene s = open_sliding(&p);
+        scoped_scene s = open_sliding(&p);
         const double a = p.mu * GRAVITY, m = mass_of(&s), got = slide_of(&p, &s, t);
         const double v = mean_along(&p, &s, drape_sim_velocities(s.sim), 1e-6);
         const drape_energy e = drape_sim_energy(s.sim);
@@ -226,15 +222,13 @@ START_TEST(a_plate_carries_the_sheet)
                      strcmp(p.method, "midpoint") == 0 ? 4 * share * share : 2 * share);
         if (strcmp(p.method, "midpoint") == 0)
             assert_below(fabs(e.numerical), 1e-6 * kinetic);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. The numerical part
  * of midpoint is its error in the energy of the barrier, whose frequency w = 1e3/s gives (w h)^2/24 of the
  * kick's m (2 U)^2/2. */
-START_TEST(a_rising_plate_does_work)
+TEST(a_rising_plate_does_work)
 {
     for (size_t k = 0; k < METHODS; k++) {
         const double speed = 0.1, t = 0.1, h = 1e-4;
@@ -242,7 +236,7 @@ START_TEST(a_rising_plate_does_work)
                            .dt = h,
                            .mu = 0.5,
                            .collider = ", 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]"};
-        scene s = open_sliding(&p);
+        scoped_scene s = open_sliding(&p);
         const double m = mass_of(&s), start = drape_sim_energy(s.sim).gravity;
         scene_advance(&s, t);
         const drape_energy e = drape_sim_energy(s.sim);
@@ -256,10 +250,8 @@ START_TEST(a_rising_plate_does_work)
         ck_assert_msg(e.numerical > -0.05 * kick && e.numerical < 1.05 * kick, "%s: %g J", p.method,
                       e.numerical);
         ck_assert(lifted > work - m * GRAVITY * 1e-4 && lifted < work + kick);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- The capstan ---- */
 
@@ -310,7 +302,7 @@ static double pull_at(scene *s, int32_t first)
  * normal: cos 2 b, 2 b^2 = 2e-3 each. The legs start REACH further out than the strip lies, an angle of
  * REACH/leg = 2e-3 each, times mu. Lagged friction is that of the pressures one step ago. These have grown
  * in proportion to the time, except for a tenth: by h/t. */
-START_TEST(a_capstan_holds_by_its_angle)
+TEST(a_capstan_holds_by_its_angle)
 {
     static const double mus[] = {0.1, 0.3, 0.5};
     char folder[] = "/tmp/drape-capstan-XXXXXX", path[64];
@@ -319,7 +311,7 @@ START_TEST(a_capstan_holds_by_its_angle)
     write_strip(path);
     for (int i = 0; i < 6; i++) {
         const double mu = mus[i % 3], b = acos(-1.0) / TURNS / 2, leg = LEG * acos(-1.0) * POST / TURNS;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'file': '%s'}, 'terms': ['stretch.edge'],"
             " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.01},"
             " 'pins': [{'nodes': [0, 1]}, {'nodes': [%d, %d], 'track': [[0, [0,0,0]], [1, [0,-0.04,0]]]}]}],"
@@ -336,11 +328,6 @@ START_TEST(a_capstan_holds_by_its_angle)
         assert_below(fabs(taut / slack / wanted - 1),
                      mu * acos(-1.0) * (b * b * (1 + mu * mu) / 3 + (i / 3 ? 1.1 * 0.01 : 0)) + 4 * b * b +
                          2 * mu * REACH / leg);
-        scene_close(&s);
     }
     ck_assert_int_eq(unlink(path) + rmdir(folder), 0);
 }
-END_TEST
-
-SUITE("friction", sticks_but_for_its_creep, slides_as_far_as_it_should, a_plate_carries_the_sheet,
-      a_rising_plate_does_work, a_capstan_holds_by_its_angle)

@@ -7,7 +7,7 @@
 
 static void compare(const char *settings)
 {
-    scene s = four_nodes(1e-12, settings);
+    scoped_scene s = four_nodes(1e-12, settings);
     double worst = 0;
     for (size_t i = 0; i < sizeof golden_four_nodes / sizeof *golden_four_nodes; i++) {
         scene_advance(&s, golden_four_nodes[i].step * FOUR_NODES_STEP);
@@ -15,20 +15,15 @@ static void compare(const char *settings)
             worst = fmax(worst, fabs(drape_sim_positions(s.sim)[9 + k] - golden_four_nodes[i].x[k]));
     }
     assert_below(worst, TOLERANCE);
-    scene_close(&s);
 }
 
-START_TEST(four_nodes_as_before)
+TEST(four_nodes_as_before)
 {
     compare("");
 }
-END_TEST
 
-START_TEST(four_nodes_by_other_solvers)
+TEST(four_nodes_by_other_solvers)
 {
     compare(", 'linear_solver': 'dense'");
     compare(", 'globalization': 'line_search'");
 }
-END_TEST
-
-SUITE("golden", four_nodes_as_before, four_nodes_by_other_solvers)

@@ -9,7 +9,7 @@
 /* Linear and cubic through (0, 1), (1, 3), (3, 2), (4, 2): constant outside, through the values, beyond
  * none of them, the cubic with a continuous slope: a difference over d = 1e-6 misses the slope by d/2 f''
  * < 1e-5 or, at a key, twice that. A cubic over one interval is the smooth step s^2 (3 - 2 s) to the bit. */
-START_TEST(factors_are_those_of_the_keys)
+TEST(factors_are_those_of_the_keys)
 {
     double time[] = {0, 1, 3, 4}, value[] = {1, 3, 2, 2}, slope[4];
     drape_history h = {.name = "h", .key_count = 4, .time = time, .value = value};
@@ -41,7 +41,6 @@ START_TEST(factors_are_those_of_the_keys)
     for (double t = 0; t <= 0.5; t += 1.0 / 128)
         ck_assert_double_eq(drape_history_factor(&ramp, t), 2 * t * (2 * t) * (3 - 2 * (2 * t)));
 }
-END_TEST
 
 /* ---- Every load ---- */
 
@@ -76,7 +75,7 @@ static scene loaded(const char *load, const char *history, const char *method)
                       terms, method, strcmp(method, "verlet") == 0 ? "stable" : "halving");
 }
 
-START_TEST(a_history_multiplies_every_load)
+TEST(a_history_multiplies_every_load)
 {
     static const char *const methods[] = {"be", "rosenbrock", "verlet", "newton_k"};
     for (size_t i = 0; i < sizeof loads / sizeof *loads; i++)
@@ -93,13 +92,12 @@ START_TEST(a_history_multiplies_every_load)
             scene_close(&a), scene_close(&b), scene_close(&c);
         }
 }
-END_TEST
 
 /* Backward Euler gives a free sheet the velocity g sum h f(t_k) to rounding, under gravity with a history
  * that is linear from 0 to 2 in 0.1 s, and then falls to -1 in 0.2 s. */
-START_TEST(gravity_with_a_history_adds_up_to_its_impulse)
+TEST(gravity_with_a_history_adds_up_to_its_impulse)
 {
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': "
                    "0.3, 'height': 0.2}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
                    "'areal_density': 0.2}, 'terms': ['stretch.cst']}], 'gravity': [0, -10, 0], "
@@ -114,9 +112,7 @@ START_TEST(gravity_with_a_history_adds_up_to_its_impulse)
     }
     for (int i = 0; i < 4; i++)
         ck_assert_double_eq_tol(scene_state(&s)->v[3 * i + 1], sum, 1e-10);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Work and kinks ---- */
 
@@ -134,11 +130,11 @@ static drape_status note_ends(void *user, const drape_event *event)
 }
 
 /* Methods that control their error end steps at the keys. */
-START_TEST(steps_end_at_kinks)
+TEST(steps_end_at_kinks)
 {
     static const char *const methods[] = {"ida", "radau", "rosenbrock", "dirk"};
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             SHEET
             "'gravity': [0, -9.81, 0], 'gravity_history': 'steps', 'histories': [{'name': 'steps', "
             "'times': [0.013, 0.029, 0.03, 0.071], 'values': [0, 1, 0.2, 3]}, {'name': 'unused', 'times': "
@@ -149,18 +145,16 @@ START_TEST(steps_end_at_kinks)
         ck_assert_int_eq(drape_sim_observe(s.sim, note_ends, &e), DRAPE_OK);
         scene_advance(&s, 0.1);
         ck_assert_msg(e.found == 4, "%s: %d", methods[m], e.found);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A free sheet of mass m under gravity f(t) g from rest, f = t/T: v = g t^2/(2 T) = 1 m/s. The potential
  * -m g f y and the work of the changing factor are both in the account, which closes although radau makes
  * few steps: to the errors of its tolerance, 1e-8 of the energy. */
-START_TEST(the_energy_account_closes)
+TEST(the_energy_account_closes)
 {
     for (int cubic = 0; cubic < 2; cubic++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.3, "
             "'height': 0.3}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, "
             "'terms': ['stretch.cst']}], 'gravity': [0, -10, 0], 'gravity_history': 'up', 'histories': "
@@ -174,16 +168,14 @@ START_TEST(the_energy_account_closes)
         ck_assert_double_eq_tol(e.kinetic, mass * v * v / 2, 1e-8 * mass * v * v);
         printf("# %ld steps\n", s.accepted);
         assert_below(fabs(e.numerical), 1e-8 * e.kinetic);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Statics ---- */
 
 /* An equilibrium has the loads of its time: a quarter of the load with the factor 4, to the residual of
  * static, 1e-10 N over 10 N/m. */
-START_TEST(an_equilibrium_has_the_load_of_its_time)
+TEST(an_equilibrium_has_the_load_of_its_time)
 {
     scene a = loaded("'type': 'load.line', 'edge': 'right', 'force': [0.2, 0, 0]", "", "static");
     scene b = scene_open(
@@ -195,18 +187,17 @@ START_TEST(an_equilibrium_has_the_load_of_its_time)
         ck_assert_double_eq_tol(scene_state(&a)->x[i], scene_state(&b)->x[i], 1e-9);
     scene_close(&a), scene_close(&b);
 }
-END_TEST
 
 /* ---- Jumps ---- */
 
 /* A free sheet at rest, whose gravity g = 10 is switched on within 1 ns before the end of a step of h = 5 ms.
  * Which methods of fixed steps feel it in this step is open, so that v = g (0.05 s + h) at most; but no check
  * takes its work for energy out of nothing. */
-START_TEST(a_jump_at_the_end_of_a_step_is_no_error)
+TEST(a_jump_at_the_end_of_a_step_is_no_error)
 {
     static const char *const methods[] = {"be", "bdf2", "trbdf2", "verlet", "newton_k"};
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.3, "
             "'height': 0.3}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, "
             "'terms': ['stretch.cst']}], 'gravity': [0, -10, 0], 'gravity_history': 'on', 'histories': "
@@ -218,14 +209,12 @@ START_TEST(a_jump_at_the_end_of_a_step_is_no_error)
         const double v = -scene_state(&s)->v[1];
         printf("# %s: %.4g m/s\n", methods[m], v);
         ck_assert(v > 0.5 * (1 - 1e-3) && v < 0.55 * (1 + 1e-3));
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Of a host ---- */
 
-START_TEST(histories_of_a_host)
+TEST(histories_of_a_host)
 {
     double times[] = {0, 1}, values[] = {1, 2};
     drape_history_def history;
@@ -240,20 +229,18 @@ START_TEST(histories_of_a_host)
                                       {"areal_density", 1, NULL}},
                         grid[] = {
                             {"columns", 2, NULL}, {"rows", 2, NULL}, {"width", 1, NULL}, {"height", 1, NULL}};
-    drape_cloth_def cloth;
-    drape_scene_def def;
-    drape_cloth_def_init(&cloth, sizeof cloth);
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
     cloth.material = material;
     cloth.material_count = 3;
-    drape_scene_def_init(&def, sizeof def);
     def.cloths = &cloth;
     def.cloth_count = 1;
     def.histories = &history;
     def.history_count = 1;
     def.gravity_history = "h";
-    scene s = scene_empty();
-    ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    scoped_scene s = scene_empty();
+    assert_ok(s.ctx, drape_model_create(s.ctx, &def, &s.model));
     ck_assert_int_eq(s.model->history_count, 1);
     ck_assert_ptr_eq(s.model->terms[0].history, s.model->histories);
     drape_model_destroy(&s.model);
@@ -280,10 +267,4 @@ START_TEST(histories_of_a_host)
         ck_assert_msg(strstr(drape_context_message(s.ctx), wrong[i].says), "%s",
                       drape_context_message(s.ctx));
     }
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("history", factors_are_those_of_the_keys, a_history_multiplies_every_load,
-      gravity_with_a_history_adds_up_to_its_impulse, steps_end_at_kinks, the_energy_account_closes,
-      an_equilibrium_has_the_load_of_its_time, a_jump_at_the_end_of_a_step_is_no_error, histories_of_a_host)

@@ -48,8 +48,7 @@ static void roll(const scene *s, double curvature, double *x)
 static void move(scene *s, const double *x)
 {
     static const double still[3 * NODES];
-    const drape_status status = drape_sim_set_state(s->sim, drape_sim_time(s->sim), x, still);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_set_state(s->sim, drape_sim_time(s->sim), x, still));
 }
 
 /* The elastic energy, with what slides in it, of the positions x from the present state. */
@@ -80,7 +79,7 @@ static double slide(double curvature, double *slid)
 /* The moment of the strip is that of the elastic one plus the friction of a slider, in the same units, around
  * a loop: its height is 2 HB. Angles are exact, and the energy is quadratic but at the corners, where the
  * difference sees both sides: a quarter of the step times the stiffness of the slider. */
-START_TEST(moments_go_around_the_loop)
+TEST(moments_go_around_the_loop)
 {
     scene s = strip(HYSTERESIS, "", AT_REST), elastic = strip("", "", AT_REST);
     double x[3 * NODES], slid = 0, widest[2] = {0};
@@ -97,17 +96,17 @@ START_TEST(moments_go_around_the_loop)
     assert_below(fabs(widest[0] + widest[1] - 2 * FRICTION), 2 * CORNER);
     scene_close(&s), scene_close(&elastic);
 }
-END_TEST
 
 /* A fold of the curvature K springs back to (1 - hardening) (K - yield), in an equilibrium that is found to a
  * residual of 1e-10 N: 3e-6 rad here. */
-START_TEST(creases_keep_their_fold)
+TEST(creases_keep_their_fold)
 {
     static const double folds[] = {20, 40, 60};
     for (size_t i = 0; i < sizeof folds / sizeof *folds; i++) {
-        scene s = strip(CREASE, "{'edge': 'left', 'clamp': true}",
-                        "'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': 1e-10}, "
-                        "'duration': 1");
+        scoped_scene s =
+            strip(CREASE, "{'edge': 'left', 'clamp': true}",
+                  "'gravity': [0, 0, 0], 'integrator': {'method': 'static', 'tolerance': 1e-10}, "
+                  "'duration': 1");
         double x[3 * NODES];
         roll(&s, folds[i], x);
         move(&s, x);
@@ -121,10 +120,8 @@ START_TEST(creases_keep_their_fold)
         }
         const double bent = LENGTH * (COLUMNS - 2) / (COLUMNS - 1);
         assert_below(fabs(turn - (1 - HARDENS) * kept * bent), 1e-4 * folds[i] * bent);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Shear ---- */
 
@@ -141,10 +138,10 @@ static void shear(const scene *s, double sine, double *x)
 }
 
 /* The force over the shear angle is that of the curve plus or minus HG. */
-START_TEST(shear_goes_around_the_loop)
+TEST(shear_goes_around_the_loop)
 {
     const double stiffness = 30, friction = 1.5; /* [N/m] */
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.1, "
         "'height': 0.1}, 'material': {'young_modulus': 1e6, 'thickness': 5e-4, 'areal_density': "
         "0.15, 'shear_curve': [[30, %.17g]]}, 'terms': [{'type': 'stretch.curve', "
@@ -162,9 +159,7 @@ START_TEST(shear_goes_around_the_loop)
         assert_below(fabs(force - stiffness * sine - friction * (sine - slid) / begins), 1e-6 * stiffness);
         move(&s, x);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- In motion ---- */
 
@@ -179,23 +174,21 @@ static scene falling(const char *integrator)
 
 /* What slides is dissipated, and nothing else is lost: methods whose own error is small agree on it, and keep
  * the balance to a per cent of it. The time is before the strip swings back. */
-START_TEST(sliding_is_in_the_balance)
+TEST(sliding_is_in_the_balance)
 {
     static const char *const accurate[] = {"{'method': 'radau'}", "{'method': 'midpoint', 'dt': 0.002}",
                                            "{'method': 'verlet'}", "{'method': 'dirk'}"};
     double first = 0;
     for (size_t i = 0; i < sizeof accurate / sizeof *accurate; i++) {
-        scene s = falling(accurate[i]);
+        scoped_scene s = falling(accurate[i]);
         scene_advance(&s, 0.15);
         const drape_energy e = drape_sim_energy(s.sim);
         first = i == 0 ? e.dissipated : first;
         ck_assert_double_gt(e.dissipated, 0.02 * e.kinetic);
         assert_below(fabs(e.numerical), 0.02 * e.dissipated);
         assert_below(fabs(e.dissipated - first), 0.02 * first);
-        scene_close(&s);
     }
 }
-END_TEST
 
 typedef struct watched {
     const scene *s;
@@ -224,11 +217,11 @@ static drape_status follow(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-START_TEST(rejected_steps_move_no_slider)
+TEST(rejected_steps_move_no_slider)
 {
-    scene s = strip(HYSTERESIS CREASE, "{'edge': 'left', 'clamp': true}",
-                    "'integrator': {'method': 'be', 'dt': 0.02}, 'controller': {'type': 'strain', "
-                    "'max_move': 0.2}, 'duration': 1");
+    scoped_scene s = strip(HYSTERESIS CREASE, "{'edge': 'left', 'clamp': true}",
+                           "'integrator': {'method': 'be', 'dt': 0.02}, 'controller': {'type': 'strain', "
+                           "'max_move': 0.2}, 'duration': 1");
     const drape_term *bending = &s.model->terms[1];
     const size_t count = (size_t)bending->sliders * (size_t)bending->elements.count;
     watched w = {.s = &s, .slid = calloc(count, sizeof *w.slid)};
@@ -241,12 +234,10 @@ START_TEST(rejected_steps_move_no_slider)
     /* sums in another order, of up to a thousand numbers a step */
     assert_below(fabs(drape_sim_energy(s.sim).dissipated - w.dissipated), 1e-12 * w.dissipated);
     free(w.slid);
-    scene_close(&s);
 }
-END_TEST
 
 /* A run that goes on from a checkpoint has the bits of one that was not interrupted. */
-START_TEST(checkpoints_keep_sliders)
+TEST(checkpoints_keep_sliders)
 {
     static const char *const methods[] = {"{'method': 'be', 'dt': 0.01}",
                                           "{'method': 'bdf2', 'dt': 0.01}",
@@ -258,10 +249,9 @@ START_TEST(checkpoints_keep_sliders)
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         scene_resumes(falling(methods[i]), falling(methods[i]), 0.06, 0.1, methods[i]);
 }
-END_TEST
 
 /* Another model of the same cloth goes on with the sliders of the one before. */
-START_TEST(a_new_model_keeps_sliders)
+TEST(a_new_model_keeps_sliders)
 {
     scene s = falling("{'method': 'be', 'dt': 0.01}"), other = falling("{'method': 'be', 'dt': 0.01}");
     const drape_term *bending = &s.model->terms[1];
@@ -276,24 +266,21 @@ START_TEST(a_new_model_keeps_sliders)
     free(slid);
     scene_close(&s), scene_close(&other);
 }
-END_TEST
 
 /* Every derivative, at a random state in which most sliders slip. */
-START_TEST(derivatives_agree_with_differences)
+TEST(derivatives_agree_with_differences)
 {
-    scene s =
+    scoped_scene s =
         scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': "
                     "0.2, 'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
                     "'areal_density': 0.2}, 'terms': [{'type': 'stretch.curve', 'shear_friction': 2, "
                     "'friction_angle': 1}, {'type': 'bend.midedge', 'poisson': 0" HYSTERESIS CREASE
                     "}]}], 'duration': 1}");
     scene_check_derivatives(&s);
-    scene_close(&s);
 }
-END_TEST
 
 /* One line with place and reason. */
-START_TEST(incomplete_parameters_are_refused)
+TEST(incomplete_parameters_are_refused)
 {
     static const char *const wrong[][2] = {
         {"'bend.midedge', 'poisson': 0, 'friction': 3", "\"friction\" = 3 needs \"friction_curvature\""},
@@ -320,8 +307,7 @@ START_TEST(incomplete_parameters_are_refused)
                  "200},\n "
                  "'terms': [{'type': %s}]}]}",
                  wrong[i][0]);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
+        quote(text);
         ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
         ck_assert_int_eq(drape_scene_parse(ctx, text, "s.json", &parsed), DRAPE_OK);
         ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_E_ARGUMENT);
@@ -330,8 +316,3 @@ START_TEST(incomplete_parameters_are_refused)
         drape_scene_destroy(&parsed), drape_context_destroy(&ctx);
     }
 }
-END_TEST
-
-SUITE("hysteresis", moments_go_around_the_loop, creases_keep_their_fold, shear_goes_around_the_loop,
-      sliding_is_in_the_balance, rejected_steps_move_no_slider, checkpoints_keep_sliders,
-      a_new_model_keeps_sliders, derivatives_agree_with_differences, incomplete_parameters_are_refused)

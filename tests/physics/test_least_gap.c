@@ -29,7 +29,7 @@ static const char *method_of(const char *name, double dt)
 /* Contact becomes stiffer while the sheet is pulled over the tip. The energy which that adds to present
  * contacts is counted as work: the numerical dissipation of backward Euler never falls by more than a
  * thousandth of it. */
-START_TEST(stiffening_is_work)
+TEST(stiffening_is_work)
 {
     folder_enter();
     folder_write("tip.obj", tetrahedron);
@@ -59,14 +59,13 @@ START_TEST(stiffening_is_work)
     scene_close(&s);
     folder_leave();
 }
-END_TEST
 
 /* A sheet that begins one activation distance deep in the ground is inside: the parabola pushes it out, and
  * it leaves with the energy b(-1) of that. Without gravity, and with restitution 1, midpoint conserves it up
  * to the change of b over a step, here less than a twentieth. Then no pair is inside any more. */
-START_TEST(what_begins_inside_is_pushed_out_gently)
+TEST(what_begins_inside_is_pushed_out_gently)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
         "'width': 0.2, 'height': 0.2,"
         " 'transform': {'translate': [-0.1, -4e-3, 0.1]}}, " MATERIAL
@@ -91,9 +90,7 @@ START_TEST(what_begins_inside_is_pushed_out_gently)
     ck_assert_double_gt(height, 4e-3);
     ck_assert_int_eq(contact->inside.count, 0);
     ck_assert_double_eq_tol(drape_sim_energy(s.sim).kinetic, stored, 0.05 * stored);
-    scene_close(&s);
 }
-END_TEST
 
 #define ABOVE_A_BOX                                                                                          \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.1, 'height': "   \
@@ -103,9 +100,9 @@ END_TEST
 
 /* A sheet at 1.5 least gaps above a box: gaps cannot halve any more, and a step from there may be rejected
  * again and again, so contact becomes twice as stiff with every attempt. */
-START_TEST(stiffness_rises_where_gaps_cannot_shrink)
+TEST(stiffness_rises_where_gaps_cannot_shrink)
 {
-    scene s = scene_open(ABOVE_A_BOX, 1e6);
+    scoped_scene s = scene_open(ABOVE_A_BOX, 1e6);
     drape_state *at = scene_state(&s);
     const struct drape_contact *contact = drape_system_contact(s.sim->system);
     for (size_t i = 1; i < 3 * (size_t)s.model->node_count; i += 3)
@@ -115,15 +112,13 @@ START_TEST(stiffness_rises_where_gaps_cannot_shrink)
         ck_assert_double_eq(contact->stiffening.factor, 1 << k);
         drape_system_end_step(s.sim->system);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* A sheet that begins a few units of rounding above a box, below the least gap, may get nearer in each step
  * by rounding: not through the surface of the box, however many steps there are. */
-START_TEST(rounding_does_not_add_up)
+TEST(rounding_does_not_add_up)
 {
-    scene s = scene_open(ABOVE_A_BOX, 1e6);
+    scoped_scene s = scene_open(ABOVE_A_BOX, 1e6);
     drape_state *at = scene_state(&s);
     const double rounding = drape_system_contact(s.sim->system)->broad.rounding;
     const size_t n = 3 * (size_t)s.model->node_count;
@@ -150,13 +145,11 @@ START_TEST(rounding_does_not_add_up)
     printf("# %d of 200 steps accepted, the lowest node is at %.3g m\n", accepted, lowest);
     ck_assert_int_ge(accepted, 10);
     ck_assert_double_gt(lowest, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* A run that continues from a checkpoint has the bits of one that did not stop, while contact is stiffer
  * than the scene says, and while cloth is inside. */
-START_TEST(a_checkpoint_keeps_it)
+TEST(a_checkpoint_keeps_it)
 {
     folder_enter();
     folder_write("tip.obj", tetrahedron);
@@ -188,7 +181,3 @@ START_TEST(a_checkpoint_keeps_it)
     }
     folder_leave();
 }
-END_TEST
-
-SUITE("least_gap", stiffening_is_work, what_begins_inside_is_pushed_out_gently, rounding_does_not_add_up,
-      stiffness_rises_where_gaps_cannot_shrink, a_checkpoint_keeps_it)

@@ -52,11 +52,9 @@ static scene inflated(int n, bool symmetric, const double *point)
     const drape_setting tolerance[] = {{.name = "tolerance", .number = 1e-12}};
     const drape_entry_def terms[] = {{"stretch.cst", NULL, 0}, {"load.pressure", pressure, 2}};
     scene s = scene_empty();
-    drape_cloth_def cloth;
-    drape_scene_def def;
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     drape_pin_def pins[3];
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_scene_def_init(&def, sizeof def);
     octant(n, x, triangle);
     cloth.mesh.positions = x, cloth.mesh.node_count = (size_t)(n + 1) * (size_t)(n + 2) / 2;
     cloth.mesh.triangles = triangle, cloth.mesh.triangle_count = (size_t)n * (size_t)n;
@@ -75,20 +73,20 @@ static scene inflated(int n, bool symmetric, const double *point)
     def.cloths = &cloth, def.cloth_count = 1;
     memset(def.gravity, 0, sizeof def.gravity);
     def.integrator = (drape_entry_def){"static", tolerance, 1};
-    ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, drape_model_create(s.ctx, &def, &s.model));
     scene_start(&s, NULL);
     return s;
 }
 
 /* On nodes in the interior the force is a third of p times the areas around them as vectors, wherever the
  * point is; and its derivatives, which in one triangle depend on the point, are exact. */
-START_TEST(pressure_on_the_interior_does_not_depend_on_the_point)
+TEST(pressure_on_the_interior_does_not_depend_on_the_point)
 {
     static const double points[2][3] = {{0}, {0.3, -0.2, 0.5}};
     enum { N = 6, COUNT = (N + 1) * (N + 2) / 2 };
     double g[2][3 * COUNT], exact[3 * COUNT] = {0};
     for (int c = 0; c < 2; c++) {
-        scene s = inflated(N, false, points[c]);
+        scoped_scene s = inflated(N, false, points[c]);
         const drape_state *state = scene_state(&s);
         drape_check_result rows[32];
         int32_t count = 0;
@@ -112,7 +110,6 @@ START_TEST(pressure_on_the_interior_does_not_depend_on_the_point)
         ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, rows, 32, &count), DRAPE_OK);
         for (int32_t i = 0; i < count && i < 32; i++)
             ck_assert_msg(rows[i].pass, "%s %s: %g", rows[i].term, rows[i].what, rows[i].error);
-        scene_close(&s);
     }
     for (int i = 1; i < N; i++)
         for (int j = 1; i + j < N; j++)
@@ -121,7 +118,6 @@ START_TEST(pressure_on_the_interior_does_not_depend_on_the_point)
                                         exact[3 * number(N, i, j) + c % 3],
                                         64 * DBL_EPSILON * PRESSURE); /* terms of p |X|^2 < p 1 m2 cancel */
 }
-END_TEST
 
 /* ---- Point loads ---- */
 
@@ -141,7 +137,7 @@ static scene loaded(const char *method, const char *terms, double gravity)
 
 /* Equal masses with equal forces, of two loads, move as under gravity, by every method and to what it
  * leaves: residuals, or errors of 1e-6 of a size of 0.3 m. */
-START_TEST(equal_forces_on_equal_masses_are_gravity)
+TEST(equal_forces_on_equal_masses_are_gravity)
 {
     for (int m = 0; drape_integrators[m]; m++) {
         const char *name = drape_integrators[m]->entry.name;
@@ -159,7 +155,6 @@ START_TEST(equal_forces_on_equal_masses_are_gravity)
         scene_close(&a), scene_close(&b);
     }
 }
-END_TEST
 
 /* A folded, spinning cloth on supports, with a pin that turns and loads that rise, goes on from a checkpoint
  * with the same bits, under every integrator. */
@@ -185,11 +180,11 @@ static scene everything(const char *method)
         method, strcmp(method, "verlet") == 0 ? "stable" : "halving");
 }
 
-START_TEST(all_of_it_goes_on_from_a_checkpoint)
+TEST(all_of_it_goes_on_from_a_checkpoint)
 {
     for (int m = 0; drape_integrators[m]; m++) {
         const char *name = drape_integrators[m]->entry.name;
-        bytes saved = {0};
+        scoped_bytes saved = {0};
         scene a = everything(name), b = everything(name);
         scene_advance(&a, 0.05);
         ck_assert_int_eq(drape_sim_save_to(a.sim, bytes_keep, &saved), DRAPE_OK);
@@ -200,10 +195,5 @@ START_TEST(all_of_it_goes_on_from_a_checkpoint)
                           drape_state_hash(b.model, scene_state(&b)),
                       "%s", name);
         scene_close(&a), scene_close(&b);
-        free(saved.data);
     }
 }
-END_TEST
-
-SUITE("load", pressure_on_the_interior_does_not_depend_on_the_point, equal_forces_on_equal_masses_are_gravity,
-      all_of_it_goes_on_from_a_checkpoint)

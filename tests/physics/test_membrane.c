@@ -66,12 +66,12 @@ static bool on_boundary(int32_t node)
 
 /* An inner node has six springs in three opposite pairs; an affine map keeps the pairs equal and opposite,
  * so the forces cancel at any stretch: at a strain of 1e-9, and at one of 100 %. */
-START_TEST(interior_forces_vanish_under_any_affine_map)
+TEST(interior_forces_vanish_under_any_affine_map)
 {
     static const double gradient[9] = {0.731, 0.113, 0.412, -0.297, 0.531, 0.843, 0.613, -0.179, -0.921};
     static const double sizes[] = {1e-9, 1e-4, 0.13, 1.07};
     double g[3 * (EDGES + 1) * (EDGES + 1)], worst = 0;
-    scene s = sheet("consistent");
+    scoped_scene s = sheet("consistent");
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         double F[9];
         for (int i = 0; i < 9; i++)
@@ -84,15 +84,13 @@ START_TEST(interior_forces_vanish_under_any_affine_map)
     }
     /* Coordinates are below 2 (EDGES + 1) LENGTH. */
     assert_below(worst, force_noise(sqrt(3.0) / 2 * membrane, 2 * (EDGES + 1) * LENGTH));
-    scene_close(&s);
 }
-END_TEST
 
 /* The patch test as a solve: boundary nodes are pinned where the map moves them, and the inner ones find
  * their positions. A step of 1e6 s is statics: the inertia M/h^2 is 1e-18 of the stiffness. The stretch of
  * 5 to 12 % keeps every spring in tension, so the Hessian is at least that of the springs' along-edge parts
  * in the plane. */
-START_TEST(patch_test_as_a_solve)
+TEST(patch_test_as_a_solve)
 {
     static const double F[9] = {1.12, 0, 0.03, 0.2, 1, -0.1, 0.02, 0, 1.05};
     static drape_pin_def pins[4 * EDGES];
@@ -103,11 +101,9 @@ START_TEST(patch_test_as_a_solve)
         {"young_modulus", MODULUS, NULL}, {"thickness", THICKNESS, NULL}, {"areal_density", 0.2, NULL}};
     static const drape_setting integrator[] = {{"dt", 1e6, NULL}, {"tolerance", 1e-11, NULL}};
     static const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}};
-    scene rest = sheet("consistent"), s = scene_empty();
-    drape_cloth_def cloth;
-    drape_scene_def def;
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_scene_def_init(&def, sizeof def);
+    scoped_scene rest = sheet("consistent"), s = scene_empty();
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     size_t count = 0;
     deform(&rest, F);
     for (int32_t i = 0; i < rest.model->node_count; i++) {
@@ -136,7 +132,7 @@ START_TEST(patch_test_as_a_solve)
     memset(def.gravity, 0, sizeof def.gravity);
     def.integrator = (drape_entry_def){"be", integrator, 2};
     def.frame_rate = 1e-6;
-    ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, drape_model_create(s.ctx, &def, &s.model));
     scene_start(&s, NULL);
     /* Start with the inner nodes displaced, out of the plane too. */
     for (int32_t i = 0; i < s.model->node_count; i++)
@@ -154,19 +150,16 @@ START_TEST(patch_test_as_a_solve)
     const double weakest = sqrt(3.0) / 2 * membrane * 0.04 / 1.04 * 2 * pow(3.14159265 / EDGES, 2);
     const double noise = force_noise(sqrt(3.0) / 2 * membrane, 2 * (EDGES + 1) * LENGTH);
     assert_below(worst, sqrt(75) * (s.residual + noise) / weakest);
-    scene_close(&rest);
-    scene_close(&s);
 }
-END_TEST
 
 /* W = 1/2 E h/(1 - nu^2) ((1 - nu) S:S + nu (tr S)^2), nu = 1/3, S the symmetric displacement gradient. q
  * = u.Su + r with |r| <= |S|^2/2 (1 + |S|), so W is wrong by at most 3/2 E h |S|^3 (1 + 2 |S|); |S| <=
  * sqrt(S:S). */
-START_TEST(energy_is_that_of_the_plane_stress_sheet)
+TEST(energy_is_that_of_the_plane_stress_sheet)
 {
     static const double strains[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 0.5}, {0.631, -0.417, 0.283}};
     static const double sizes[] = {1e-2, 1e-3, 1e-4};
-    scene s = sheet("consistent");
+    scoped_scene s = sheet("consistent");
     const double area = 2 * EDGES * EDGES * sqrt(3.0) / 4 * LENGTH * LENGTH, nu = 1.0 / 3;
     for (size_t k = 0; k < sizeof strains / sizeof *strains; k++)
         for (size_t j = 0; j < sizeof sizes / sizeof *sizes; j++) {
@@ -179,9 +172,4 @@ START_TEST(energy_is_that_of_the_plane_stress_sheet)
             assert_below(fabs(elastic(&s) - sheet_energy),
                          1.5 * membrane * area * pow(size, 3) * (1 + 2 * size));
         }
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("membrane", interior_forces_vanish_under_any_affine_map, patch_test_as_a_solve,
-      energy_is_that_of_the_plane_stress_sheet)

@@ -36,12 +36,12 @@ static void turn(const double q[4], const double *x, double *out)
 
 /* A sheet that is rotated about any axis by any angle below pi has the energy M L 2 atan2(q . e0, q_w) and
  * no other. Positions of size 1 and unit vectors of triangles of size 0.4 are exact up to a few roundings. */
-START_TEST(the_potential_is_the_twist_of_the_quaternion)
+TEST(the_potential_is_the_twist_of_the_quaternion)
 {
     static const double axes[][3] = {{0, 0, 1},     {0, 0, -1},       {1, 0, 0},
                                      {0.6, 0, 0.8}, {0.3, -0.5, 0.7}, {-0.2, 0.9, 0.4}};
     static const double angles[] = {1e-6, 0.4, 1.5, 2.2, 3.1};
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': %g, "
                    "'height': %g, 'orientation': 'horizontal'}, 'material': {'young_modulus': 1, "
                    "'thickness': 1, 'areal_density': 1}, 'terms': [{'type': "
@@ -63,8 +63,4 @@ START_TEST(the_potential_is_the_twist_of_the_quaternion)
             ck_assert_double_eq_tol(energy.gravity + energy.elastic, MOMENT * SIDE * twist,
                                     1e3 * DBL_EPSILON);
         }
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("moment", the_potential_is_the_twist_of_the_quaternion)

@@ -52,8 +52,8 @@ static void look(const scene *s, record *seen)
     const drape_model *m = s->model;
     const double *x = drape_sim_positions(s->sim), t = drape_sim_time(s->sim);
     const int32_t count = drape_sim_relaxed(s->sim, -1, NULL);
-    bool *relaxed = calloc((size_t)m->node_count, sizeof *relaxed),
-         *around = calloc((size_t)m->node_count, 1);
+    scoped_memory bool *relaxed = calloc((size_t)m->node_count, sizeof *relaxed),
+                       *around = calloc((size_t)m->node_count, 1);
     for (int32_t i = 0; i < count; i++) {
         drape_relaxed r;
         ck_assert_int_eq(drape_sim_relaxed(s->sim, i, &r), count);
@@ -88,8 +88,6 @@ static void look(const scene *s, record *seen)
             ck_assert_int_gt(count, 0); /* nothing is inside that is not reported */
         }
     }
-    free(relaxed);
-    free(around);
 }
 
 /* Frames of 1/60 s: every call succeeds and reaches its time. */
@@ -118,7 +116,7 @@ static int64_t extra_attempts(const scene *s, int frames)
 
 static void check_pinch(const char *policy, const char *method, bool realtime)
 {
-    scene s = open_pinch(policy, method);
+    scoped_scene s = open_pinch(policy, method);
     record seen = run(&s, realtime, 84);
     drape_warning warning = {.name = ""};
     ck_assert(seen.named[0] && seen.named[1]);
@@ -147,21 +145,19 @@ static void check_pinch(const char *policy, const char *method, bool realtime)
     ck_assert_double_ge(total->seconds, 0.757 - 0.243 - FRAME);
     ck_assert_double_eq_tol(total->seconds, total->last - total->first, 1e-9); /* without a break */
     free(seen.named);
-    scene_close(&s);
 }
 
-START_TEST(test_pinch)
+TEST(test_pinch)
 {
     check_pinch("auto", "newton_k", true);
     check_pinch("relax", "newton_k", false);
     check_pinch("relax", "be", false);
 }
-END_TEST
 
 /* "auto" without a time budget, and "stop" with one: the pair is named, and the sim stays where it was. */
 static void check_stop(const char *policy, bool realtime)
 {
-    scene s = open_pinch(policy, "newton_k");
+    scoped_scene s = open_pinch(policy, "newton_k");
     drape_status status = DRAPE_OK;
     for (int f = 1; !status && f <= 30; f++)
         status = realtime ? drape_sim_advance_realtime(s.sim, FRAME, 1e9, NULL)
@@ -172,27 +168,25 @@ static void check_stop(const char *policy, bool realtime)
     ck_assert_msg(strstr(message, "no room there: with /contact/no_room \"relax\""), "%s", message);
     ck_assert_double_lt(drape_sim_time(s.sim), 0.25);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    scene_close(&s);
 }
 
-START_TEST(test_stop)
+TEST(test_stop)
 {
     check_stop("auto", false);
     check_stop("stop", true);
 }
-END_TEST
 
 /* Saved and restored while cloth is relaxed, and while it comes out, a run continues with the same bits. */
-START_TEST(test_checkpoint)
+TEST(test_checkpoint)
 {
-    scene s = open_pinch("relax", "newton_k");
+    scoped_scene s = open_pinch("relax", "newton_k");
     for (int f = 1; f <= 66; f++) {
         scene_advance(&s, f * FRAME);
         if (f != 20 && f != 46)
             continue;
         ck_assert_int_gt(drape_sim_relaxed(s.sim, 0, NULL), 0);
-        bytes saved = bytes_save(s.sim);
-        scene other = open_pinch("relax", "newton_k");
+        scoped_bytes saved = bytes_save(s.sim);
+        scoped_scene other = open_pinch("relax", "newton_k");
         ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_OK);
         drape_relaxed a, b;
         const int32_t count = drape_sim_relaxed(s.sim, 0, &a);
@@ -204,12 +198,8 @@ START_TEST(test_checkpoint)
             scene_advance(&s, g * FRAME);
         f += 6;
         ck_assert_uint_eq(drape_sim_hash(s.sim), drape_sim_hash(other.sim));
-        free(saved.data);
-        scene_close(&other);
     }
-    scene_close(&s);
 }
-END_TEST
 
 static void keep_line(void *user, drape_log_level level, const char *text)
 {
@@ -221,14 +211,14 @@ static void keep_line(void *user, drape_log_level level, const char *text)
 
 /* The log says once that cloth at a ball is relaxed, and once that it is not any more, with the times of the
  * summary; also if the run was saved in between and restored. */
-START_TEST(test_log)
+TEST(test_log)
 {
     char lines[2000] = "", line[200];
-    scene s = open_pinch("relax", "newton_k"), other = open_pinch("relax", "newton_k");
+    scoped_scene s = open_pinch("relax", "newton_k"), other = open_pinch("relax", "newton_k");
     s.ctx->def.log = other.ctx->def.log = keep_line;
     s.ctx->def.log_user = other.ctx->def.log_user = lines;
     scene_advance(&s, 20 * FRAME);
-    bytes saved = bytes_save(s.sim);
+    scoped_bytes saved = bytes_save(s.sim);
     ck_assert_int_eq(drape_sim_restore_from(other.sim, saved.data, saved.size), DRAPE_OK);
     scene_advance(&other, 84 * FRAME);
     int count = 0;
@@ -243,11 +233,7 @@ START_TEST(test_log)
         snprintf(line, sizeof line, "t=%.9g: the cloth at %s has room again;", total->last, name);
         ck_assert_msg(strstr(lines, line), "%s not in %s", line, lines);
     }
-    free(saved.data);
-    scene_close(&other);
-    scene_close(&s);
 }
-END_TEST
 
 /* Two bodies close upon the cloth, and part at some time: half a second later nothing is inside them. Closes
  * the scene. Returns the largest depth. */
@@ -264,7 +250,7 @@ static double check_bodies(scene *s, double part)
 }
 
 /* A ball that is pressed 3 cm into a table through the cloth on it. */
-START_TEST(test_table)
+TEST(test_table)
 {
     scene s = scene_open(
         SHEET " 'colliders': [{'name': 'table', 'type': 'box', 'center': [0, -0.1, 0], 'size': [1, 0.2, 1],"
@@ -274,27 +260,24 @@ START_TEST(test_table)
         "horizontal", 0.005, 0.25, "", "auto", "newton_k");
     ck_assert_double_le(check_bodies(&s, 0.775), 0.04); /* the ball leaves the table then */
 }
-END_TEST
 
 /* Pins that are carried 6 cm into a ball and back: the cloth around them goes with them, and comes out. */
-START_TEST(test_pins_inside)
+TEST(test_pins_inside)
 {
-    scene s = scene_open(SHEET " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0, 0.25, -0.12],"
-                               " 'radius': 0.1}]," REST,
-                         "vertical", 0.5, 0.0,
-                         CORNERS
-                         ", {'nodes': [84], 'track': [[0.1, [0,0,0]], [0.4, [0,0,-0.08]], [0.7, [0,0,-0.08]],"
-                         " [1, [0,0,0]]]}",
-                         "auto", "newton_k");
+    scoped_scene s = scene_open(
+        SHEET " 'colliders': [{'name': 'ball', 'type': 'sphere', 'center': [0, 0.25, -0.12],"
+              " 'radius': 0.1}]," REST,
+        "vertical", 0.5, 0.0,
+        CORNERS ", {'nodes': [84], 'track': [[0.1, [0,0,0]], [0.4, [0,0,-0.08]], [0.7, [0,0,-0.08]],"
+                " [1, [0,0,0]]]}",
+        "auto", "newton_k");
     record seen = run(&s, true, 90);
     ck_assert(seen.named[0]);
     ck_assert_double_eq_tol(seen.deepest, 0.06, 1e-6); /* of the pin, whose place is given */
     ck_assert_double_lt(seen.last_inside, 0.925 + 0.5);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
     free(seen.named);
-    scene_close(&s);
 }
-END_TEST
 
 #define PLATE                                                                                                \
     "{'name': '%s', 'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.2, 'height': 0.2,"        \
@@ -306,9 +289,9 @@ END_TEST
 /* Pinned pieces of cloth that close upon free cloth have no inside, and pass through it. No geometry tells
  * that there is no room: what refuses the step is relaxed, after some attempts. It is held again where
  * they are farther away than layers are kept, on whichever side. */
-START_TEST(test_plates)
+TEST(test_plates)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 13, 'rows': 13,"
         " 'width': 0.5, 'height': 0.5, 'orientation': 'vertical', 'transform': {'translate':"
         " [-0.25, 0.5, 0]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
@@ -328,8 +311,4 @@ START_TEST(test_plates)
     }
     ck_assert_int_gt(most, 0);
     ck_assert_int_eq(drape_sim_relaxed(s.sim, 0, NULL), 0);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("no_room", test_pinch, test_stop, test_checkpoint, test_log, test_table, test_pins_inside, test_plates)

@@ -48,7 +48,7 @@ static double step_error(const scene *s, double amplitude)
  *     v1 = (v0 - h w^2 x0)/c,   x1 = x0 + h v1,   c = 1 + h w^2 (h + beta),
  *     A = [1 - h^2 w^2/c, h/c; -h w^2/c, 1/c].
  * det A = 1/c, but the energy does not shrink by the same factor at all phases, so states are compared. */
-START_TEST(damped_oscillator_follows_its_amplification_matrix)
+TEST(damped_oscillator_follows_its_amplification_matrix)
 {
     const double w = sqrt(stiffness / mass()), amplitude = 1e-5 * LENGTH;
     static const double phases[] = {0.1, 0.5, 2}; /* w h */
@@ -59,7 +59,7 @@ START_TEST(damped_oscillator_follows_its_amplification_matrix)
             const double h = phases[k] / w, beta = ratios[j] / w;
             snprintf(term, sizeof term, "{'type': 'damp.kelvin_voigt', 'beta': %.17g},", beta);
             /* dashpots multiply the rounding of forces, 1e-13 N, by 1 + beta/h, up to 26 */
-            scene s = hexagon(h, amplitude * w, 1e-11, term);
+            scoped_scene s = hexagon(h, amplitude * w, 1e-11, term);
             scene_watch(&s);
             double x = 0, v = amplitude * w, worst = 0;
             for (int n = 1; n <= STEPS; n++) {
@@ -74,9 +74,5 @@ START_TEST(damped_oscillator_follows_its_amplification_matrix)
             /* Errors of steps add up, since A does not expand the energy norm; dashpots multiply forces by
              * up to 1 + beta/h. They are relative to the amplitude at the start. */
             assert_below(worst, STEPS * (1 + beta / h) * step_error(&s, amplitude));
-            scene_close(&s);
         }
 }
-END_TEST
-
-SUITE("oscillator", damped_oscillator_follows_its_amplification_matrix)

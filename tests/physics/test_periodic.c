@@ -94,20 +94,19 @@ static void compare_cells(const char *method, const char *terms, double plane, d
 
 /* One cell moves as each of three: methods that solve their steps, to a residual of 1e-10 N, differ by that;
  * those that choose their steps, by their error of 1e-7 of the size. */
-START_TEST(one_cell_moves_as_each_of_three)
+TEST(one_cell_moves_as_each_of_three)
 {
     for (size_t i = 0; i < method_count; i++)
         compare_cells(methods[i], MEMBRANE, -9, 1e-7);
 }
-END_TEST
 
 /* A flat sheet rolled into a closed tube of n sides: every hinge along it has the angle 2 pi/n, so that the
  * curvature is 2 pi over the length everywhere, and E = D/2 of its square and the area. */
-START_TEST(a_closed_tube_is_bent_evenly)
+TEST(a_closed_tube_is_bent_evenly)
 {
     static const char *const bending[] = {"'bend.hinge'", "'bend.midedge'"};
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 4, 'width': 0.4, "
             "'height': "
             "0.15, 'diagonals': 'parallel'}, 'material': {'young_modulus': 1e6, 'poisson_ratio': 0, "
@@ -118,26 +117,23 @@ START_TEST(a_closed_tube_is_bent_evenly)
         const double curvature = 2 * acos(-1) / 0.4,
                      expected = 1e6 * 1e-9 / 12 / 2 * curvature * curvature * 0.06;
         ck_assert_double_eq_tol(drape_sim_energy(s.sim).elastic, expected, 1e-12 * expected);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* The same onto the plane. Methods that choose their steps do so anew at each touch; those that keep the
  * energy of a bounce diverge where rounding decides which steps are rejected, and are left out. */
-START_TEST(cells_touch_a_plane_alike)
+TEST(cells_touch_a_plane_alike)
 {
     for (size_t i = 0; i < method_count; i++)
         if (strcmp(methods[i], "midpoint") != 0)
             compare_cells(methods[i], MEMBRANE, -0.02, 1e-5);
 }
-END_TEST
 
 /* Periodic along both sides, where the corners are one node, a sheet falls freely at its velocity: backward
  * Euler, 10 steps, h^2 g (1 + ... + 10), and is at rest within itself. The nodes keep their whole mass. */
-START_TEST(sheets_repeat_in_two_directions)
+TEST(sheets_repeat_in_two_directions)
 {
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': "
                    "0.3, 'height': 0.2},"
                    "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2},"
@@ -156,14 +152,12 @@ START_TEST(sheets_repeat_in_two_directions)
     const double to[3] = {0.1, -9.81 * 1e-4 * 55, 0.2};
     for (int i = 0; i < 48; i++)
         ck_assert_double_eq_tol(scene_state(&s)->x[i] - start[i], to[i % 3], 1e-9);
-    scene_close(&s);
 }
-END_TEST
 
 /* Loads on an endless sheet between two lines are as everywhere at its periodic edges: they are no boundary
  * along which lines of force act, or that wind leaves. All columns are alike, to what a residual of 1e-12 N
  * leaves over the stiffness of some N/m. Without the load the sheet would be flat. */
-START_TEST(loads_are_alike_everywhere)
+TEST(loads_are_alike_everywhere)
 {
     static const struct {
         const char *load;
@@ -176,7 +170,7 @@ START_TEST(loads_are_alike_everywhere)
                  {"{'type': 'drag.wind', 'wind': [3, 0.5, 0], 'friction': 0.01}", 0.001},
                  {"{'type': 'air.added_mass', 'span': 0.3, 'wind': [2, 0.5, 0]}", 0}};
     for (size_t i = 0; i < sizeof loads / sizeof *loads; i++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'diagonals': "
             "'parallel', 'width': 0.2, 'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': "
             "2e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst', 'bend.midedge', %s], 'pins': [{'edge': "
@@ -192,17 +186,15 @@ START_TEST(loads_are_alike_everywhere)
             for (int k = 0; k < 3; k++)
                 ck_assert_double_eq_tol(x[3 * n + k] - x[3 * (n - n % 5) + k], k == 0 ? 0.05 * (n % 5) : 0,
                                         1e-10);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* In a closed tube the volume of load.pressure is closed as well: its forces are those of load.follower. */
-START_TEST(pressure_closes_in_a_tube)
+TEST(pressure_closes_in_a_tube)
 {
     double x[2][3 * 36];
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 4, 'width': 0.4, "
             "'height': 0.15}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2}, "
             "'start': {'folds': [{'point': [0, 0, 0], 'axis': [0, 0, 1], 'side': [1, 0, 0], 'angle': 360, "
@@ -213,16 +205,14 @@ START_TEST(pressure_closes_in_a_tube)
             0.4 / (2 * acos(-1)), k ? "load.pressure" : "load.follower");
         scene_advance(&s, 1);
         memcpy(x[k], scene_state(&s)->x, sizeof x[k]);
-        scene_close(&s);
     }
     for (int i = 0; i < 3 * 36; i++)
         ck_assert_double_eq_tol(x[0][i], x[1][i], 1e-10);
 }
-END_TEST
 
-START_TEST(the_jacobian_is_that_of_the_shared_forces)
+TEST(the_jacobian_is_that_of_the_shared_forces)
 {
-    scene s =
+    scoped_scene s =
         scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
                     "'width': 0.3, 'height': 0.3},"
                     "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
@@ -232,16 +222,14 @@ START_TEST(the_jacobian_is_that_of_the_shared_forces)
                     "'pins': [{'edge': 'left', 'normal': [1, 2, 3]}, {'edge': 'right', 'normal': [1, 2, 3]},"
                     "{'nodes': [12], 'normal': [1, 2, 3]}]}], 'duration': 1}");
     scene_check_derivatives(&s);
-    scene_close(&s);
 }
-END_TEST
 
 /* The same with bending and springs across both pairs of edges, of a cell that is drawn out, with rates and
  * the angle of a corner's hinges; and of a cell so narrow that an element meets images of its own nodes. */
-START_TEST(derivatives_across_edges_are_exact)
+TEST(derivatives_across_edges_are_exact)
 {
     for (int columns = 2; columns <= 5; columns++) {
-        scene s = scene_model(
+        scoped_scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': 4, 'width': 0.3, "
             "'height': "
             "0.3, 'diagonals': 'parallel'}, 'material': {'young_modulus': 1e4, 'thickness': 5e-3, "
@@ -252,18 +240,16 @@ START_TEST(derivatives_across_edges_are_exact)
             "{'from': {'edge': 'top'}, 'to': {'edge': 'bottom'}}]}], 'duration': 1}",
             columns);
         scene_check_derivatives(&s);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Without damping the implicit midpoint rule keeps the energy of a weighted cell but for its error: that of
  * the account, which knows no work of the periodic edges. Threads change no bit. */
-START_TEST(periodic_edges_do_no_work)
+TEST(periodic_edges_do_no_work)
 {
     uint64_t hash[2];
     for (int threads = 1; threads <= 3; threads += 2) {
-        scene s =
+        scoped_scene s =
             scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, "
                         "'width': 0.2, 'height': 0.15, 'orientation': 'horizontal'},"
                         "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
@@ -272,8 +258,7 @@ START_TEST(periodic_edges_do_no_work)
                         "'right'}, 'period': [0.21, 0, 0]}]}],"
                         "'integrator': {'method': 'midpoint', 'dt': 0.001, 'tolerance': 1e-12}, "
                         "'duration': 1}");
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        drape_sim_def def = sim_def();
         def.threads = threads;
         scene_start(&s, &def);
         const drape_energy before = drape_sim_energy(s.sim);
@@ -286,14 +271,12 @@ START_TEST(periodic_edges_do_no_work)
         printf("# energy %g of %g J\n", change, moved);
         ck_assert_double_le(fabs(change), 1e-3 * moved);
         hash[threads / 2] = drape_state_hash(s.model, scene_state(&s));
-        scene_close(&s);
     }
     ck_assert_uint_eq(hash[0], hash[1]);
 }
-END_TEST
 
 /* A run goes on from a checkpoint with the same bits; a scene of another period refuses it. */
-START_TEST(checkpoints_keep_the_period)
+TEST(checkpoints_keep_the_period)
 {
     scene drawn[2] = {drawn_out(1.1), drawn_out(1.2)};
     bytes other = bytes_save(drawn[0].sim);
@@ -302,12 +285,11 @@ START_TEST(checkpoints_keep_the_period)
     free(other.data);
     scene_close(&drawn[0]), scene_close(&drawn[1]);
 }
-END_TEST
 
 /* A host cannot take images apart: not by a state, and not by pinning one of them. */
-START_TEST(hosts_keep_the_period)
+TEST(hosts_keep_the_period)
 {
-    scene s = cells("be", MEMBRANE, 1, -0.02);
+    scoped_scene s = cells("be", MEMBRANE, 1, -0.02);
     double x[45], v[45] = {0};
     const int32_t seam[2] = {5, 9};
     memcpy(x, scene_state(&s)->x, sizeof x);
@@ -324,9 +306,7 @@ START_TEST(hosts_keep_the_period)
     ck_assert_int_eq(drape_sim_unpin(s.sim, 2, seam), DRAPE_OK);
     scene_advance(&s, 0.02);
     ck_assert_double_eq_tol(scene_state(&s)->x[3 * 9] - scene_state(&s)->x[3 * 5], 0.206, 1e-13);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Refusals ---- */
 
@@ -379,31 +359,21 @@ static const struct refusal {
      "exactly one of nodes, corner, edge, row, box"},
 };
 
-START_TEST(what_does_not_repeat_is_refused)
+TEST(what_does_not_repeat_is_refused)
 {
     for (size_t i = 0; i < sizeof refusals / sizeof *refusals; i++) {
         char text[1024];
-        scene s = scene_empty();
-        drape_scene *parsed = NULL;
+        scoped_scene s = scene_empty();
+        scoped_parsed *parsed = NULL;
         snprintf(text, sizeof text,
                  "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', %s, 'width': 0.3, 'height': 0.2},"
                  "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
                  "'terms': ['stretch.cst'%s], %s}], 'duration': 1}",
                  refusals[i].mesh, refusals[i].terms, refusals[i].rest);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
+        quote(text);
         ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
         ck_assert_int_ne(drape_scene_compile(parsed, &s.model), DRAPE_OK);
         ck_assert_msg(strstr(drape_context_message(s.ctx), refusals[i].message) != NULL, "%s: %s",
                       refusals[i].message, drape_context_message(s.ctx));
-        drape_scene_destroy(&parsed);
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("periodic", one_cell_moves_as_each_of_three, a_closed_tube_is_bent_evenly, cells_touch_a_plane_alike,
-      loads_are_alike_everywhere, pressure_closes_in_a_tube, sheets_repeat_in_two_directions,
-      the_jacobian_is_that_of_the_shared_forces, derivatives_across_edges_are_exact,
-      periodic_edges_do_no_work, checkpoints_keep_the_period, hosts_keep_the_period,
-      what_does_not_repeat_is_refused)

@@ -54,11 +54,11 @@ static scene plate_and_corner(double top)
 /* The counter, and inside, see a corner as soon as it is through: its three edges, and at a height h above
  * the sheet a depth of h/sqrt 3, the distance of its faces from a point h below it on the diagonal.
  * Sampled points are 0.17 m apart and see nothing. */
-START_TEST(a_corner_through_a_face_is_counted)
+TEST(a_corner_through_a_face_is_counted)
 {
     static const double heights[] = {-1e-12, 1e-12, 3e-3};
     for (int i = 0; i < 3; i++) {
-        scene s = plate_and_corner(heights[i]);
+        scoped_scene s = plate_and_corner(heights[i]);
         const drape_collider_pose pose = {{0}, {0}};
         drape_inside inside;
         int32_t pierced;
@@ -76,10 +76,8 @@ START_TEST(a_corner_through_a_face_is_counted)
         ck_assert_int_eq(pierced, i > 0);
         /* coordinates of up to 1 m are rounded by DBL_EPSILON/2; 20 such errors */
         ck_assert_double_eq_tol(inside.deepest, i > 0 ? heights[i] / sqrt(3) : 0, 20 * DBL_EPSILON);
-        scene_close(&s);
     }
 }
-END_TEST
 
 static double random_between(uint64_t *seed, double low, double high)
 {
@@ -89,9 +87,9 @@ static double random_between(uint64_t *seed, double low, double high)
 
 /* In crumpled states the counter finds what the library finds: of cloth with cloth, and with a box, whose
  * corners are scattered through it. */
-START_TEST(the_counter_agrees_with_the_library)
+TEST(the_counter_agrees_with_the_library)
 {
-    scene s =
+    scoped_scene s =
         scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 7, 'width': 1, "
                     "'height': 1}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200}, "
                     "'terms': ['stretch.edge']}], 'colliders': [{'type': 'box', 'center': [0.5, 0, -0.5], "
@@ -117,9 +115,7 @@ START_TEST(the_counter_agrees_with_the_library)
     }
     ck_assert_int_gt(cloth, 100);
     ck_assert_int_gt(box, 100);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Runs ---- */
 
@@ -147,8 +143,8 @@ static void run_all(size_t number, const char *name, const char *text, double dt
         if (!in_sample(number, i, 2))
             continue;
         snprintf(method, sizeof method, methods[i], dt);
-        scene s = scene_open("{'drape': 1, %s, 'integrator': {%s}, 'frame_rate': 240, 'duration': 0.2}", text,
-                             method);
+        scoped_scene s = scene_open(
+            "{'drape': 1, %s, 'integrator': {%s}, 'frame_rate': 240, 'duration': 0.2}", text, method);
         ck_assert_int_eq(drape_sim_observe(s.sim, watch, &p), DRAPE_OK);
         const drape_status status = drape_sim_advance(s.sim, 0.2);
         const char *message = drape_context_message(s.ctx);
@@ -164,7 +160,6 @@ static void run_all(size_t number, const char *name, const char *text, double dt
         crossed += found > 0;
         unnamed += status == DRAPE_E_STEP_TOO_SMALL && strstr(message, "(retry_rejected)") &&
                    !strstr(message, "node");
-        scene_close(&s);
     }
     ck_assert_msg(crossed == 0 && unnamed == 0,
                   "%s: %d methods let something pass, %d stopped without naming it", name, crossed, unnamed);
@@ -242,7 +237,7 @@ static const struct {
                                "'center': [0, -0.1, 0.01], "
                                "'radius': 0.08, 'track': [[0, [0, 0, 0]], [0.15, [0, 0.03, 0]]]}]"}};
 
-START_TEST(nothing_passes_through_anything)
+TEST(nothing_passes_through_anything)
 {
     folder_enter();
     for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
@@ -252,19 +247,18 @@ START_TEST(nothing_passes_through_anything)
     }
     folder_leave();
 }
-END_TEST
 
 /* ---- Frames between steps ---- */
 
 /* A ball that turns back within steps pushes a sheet: the frames between are free of it, too. Where it turns,
  * neither the interpolant nor the straight line is. */
-START_TEST(frames_are_free_of_a_ball_that_turns_back)
+TEST(frames_are_free_of_a_ball_that_turns_back)
 {
     int64_t frames = 0;
     for (int i = 0; i < 4; i++) {
         press p = {.accepted = INT64_MIN};
         const double end = 0.03 + 0.01 * i, turn = 0.4 * end;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{" SQUARE("0") ", " SOFT "}], 'colliders': [{'type': 'sphere', "
                                                    "'center': [0.01, -0.08, 0.02], 'radius': 0.05, 'track': "
                                                    "[[0, [0, 0, 0]], [%g, [0, 0.15, "
@@ -279,11 +273,9 @@ START_TEST(frames_are_free_of_a_ball_that_turns_back)
                p.crossed.first);
         ck_assert_int_eq(p.crossed.crossed_frames + p.crossed.crossed_states, 0);
         frames += p.crossed.frames;
-        scene_close(&s);
     }
     ck_assert_int_eq(frames, 4 * 101);
 }
-END_TEST
 
 /* The times of frames, which must not decrease, and those that are not at their nominal time. */
 typedef struct times {
@@ -315,28 +307,27 @@ static drape_status note_times(void *user, const drape_event *event)
 
 /* The ball turns where the sheet is, and is back within one step, at whose ends it is far away: steps are
  * rejected until they feel it. */
-START_TEST(a_ball_that_turns_within_a_step_is_felt)
+TEST(a_ball_that_turns_within_a_step_is_felt)
 {
     times w = {.rate = 1000, .last = 0};
-    scene s = scene_open(BELOW(", 'track': [[0.021, [0, 0, 0]], [0.025, [0, 0.2, 0]], [0.029, [0, 0, 0]]]"));
+    scoped_scene s =
+        scene_open(BELOW(", 'track': [[0.021, [0, 0, 0]], [0.025, [0, 0.2, 0]], [0.029, [0, 0, 0]]]"));
     scene_watch(&s);
     ck_assert_int_eq(drape_sim_observe(s.sim, note_times, &w), DRAPE_OK);
     scene_advance(&s, 0.05);
     ck_assert_int_eq(w.press.crossed.crossed_frames + w.press.crossed.crossed_states, 0);
     ck_assert_int_gt(s.rejected, 0);
     ck_assert_double_gt(drape_sim_energy(s.sim).kinetic, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* A host sends the ball through the sheet and back within one step, on a cubic, so a step sees it at rest;
  * at the time of the frames between no state of the cloth is free of it, and they show the state at the end
  * of the step. From rest at 0, with the velocity V after T seconds, the cubic is T V s^2 (s - 1): 4/27 T V
  * high. */
-START_TEST(frames_without_room_show_the_end_of_the_step)
+TEST(frames_without_room_show_the_end_of_the_step)
 {
     times w = {.rate = 1000, .last = 0, .press = {.accepted = INT64_MIN}};
-    scene s = scene_open(BELOW(""));
+    scoped_scene s = scene_open(BELOW(""));
     ck_assert_int_eq(drape_sim_observe(s.sim, note_times, &w), DRAPE_OK);
     scene_advance(&s, 0.02);
     ck_assert_int_eq(
@@ -347,17 +338,15 @@ START_TEST(frames_without_room_show_the_end_of_the_step)
     ck_assert_int_eq(w.frames, 51);
     ck_assert_int_gt(w.late, 0);
     ck_assert_int_le(w.late, 9); /* those between 0.02 and 0.03 s */
-    scene_close(&s);
 }
-END_TEST
 
 /* A ball comes from below and lifts a sheet at rest: the first contact stores energy, all of which is work
  * of the ball, however small the step is. */
-START_TEST(a_sheet_at_rest_may_be_met)
+TEST(a_sheet_at_rest_may_be_met)
 {
     static const char *const some[] = {"be", "bdf2", "midpoint", "trbdf2"};
     for (int k = 0; k < 4; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{" SQUARE(
                 "0") ", " SOFT "}], 'gravity': [0, 0, 0], 'contact': {'distance': 1e-3}, 'colliders': "
                      "[{'type': 'sphere', "
@@ -368,12 +357,5 @@ START_TEST(a_sheet_at_rest_may_be_met)
         scene_advance(&s, 0.12);
         printf("# %s: %ld steps, %ld rejected\n", some[k], s.accepted, s.rejected);
         ck_assert_int_le(s.rejected, 10);
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("press", a_corner_through_a_face_is_counted, the_counter_agrees_with_the_library,
-      nothing_passes_through_anything, frames_are_free_of_a_ball_that_turns_back,
-      a_ball_that_turns_within_a_step_is_felt, a_sheet_at_rest_may_be_met,
-      frames_without_room_show_the_end_of_the_step)

@@ -35,8 +35,7 @@ static void stretch(scene *s, double strain)
     double x[3 * NODES];
     for (size_t i = 0; i < 3 * NODES; i++)
         x[i] = s->model->rest[i] * (i % 3 == 0 ? 1 + strain : 1);
-    const drape_status status = drape_sim_set_state(s->sim, drape_sim_time(s->sim), x, still);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_set_state(s->sim, drape_sim_time(s->sim), x, still));
 }
 
 static double pull_of(const scene *s)
@@ -50,7 +49,7 @@ static double pull_of(const scene *s)
 
 /* The coefficients of a step agree with the functions of the C library, on both sides of where the series
  * ends, and at both ends. The error of those is a rounding over z or z^2. */
-START_TEST(coefficients_of_a_step)
+TEST(coefficients_of_a_step)
 {
     static const double z[] = {1e-3, 0.1, 0.499999, 0.5, 2, 30};
     for (size_t i = 0; i < sizeof z / sizeof *z; i++) {
@@ -76,20 +75,17 @@ START_TEST(coefficients_of_a_step)
     ck_assert_double_eq(drape_decay_loss(&instant, 0.7, 0.3), 0);
     ck_assert_double_eq(drape_decay_loss(&relaxed, 0.7, 0.3), 0.5 * 0.7 * 0.7);
 }
-END_TEST
 
 /* "static" finds the equilibrium after an infinite time, and leaves the branches without force. */
-START_TEST(equilibria_are_relaxed)
+TEST(equilibria_are_relaxed)
 {
-    scene s = held("{'method': 'static', 'tolerance': 1e-10}");
+    scoped_scene s = held("{'method': 'static', 'tolerance': 1e-10}");
     stretch(&s, STRAIN);
     const double at_once = pull_of(&s), energy = drape_sim_energy(s.sim).elastic;
     scene_advance(&s, 1);
     assert_below(fabs(pull_of(&s) / at_once - 0.5), 1e-9);
     assert_below(fabs(drape_sim_energy(s.sim).dissipated / energy - 0.5), 1e-9);
-    scene_close(&s);
 }
-END_TEST
 
 #define FALLING "'gravity': [0, -9.81, 0], 'integrator': %s, 'duration': 10"
 
@@ -103,14 +99,14 @@ static scene falling(const char *integrator)
 
 /* A flap that swings: methods of the second order agree on what dashpots take, and their balance closes, both
  * the better the smaller their steps. The midpoint rule, which conserves energy else, is the reference. */
-START_TEST(losses_are_in_the_balance)
+TEST(losses_are_in_the_balance)
 {
     static const char *const methods[] = {"{'method': 'midpoint', 'dt': 5e-4}",
                                           "{'method': 'trbdf2', 'dt': 1e-3}",
                                           "{'method': 'verlet', 'dt': 1e-3}"};
     double first = 0;
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
-        scene s = falling(methods[i]);
+        scoped_scene s = falling(methods[i]);
         scene_advance(&s, 0.15);
         const drape_energy e = drape_sim_energy(s.sim);
         first = i == 0 ? e.dissipated : first;
@@ -118,13 +114,11 @@ START_TEST(losses_are_in_the_balance)
         ck_assert_msg(fabs(e.numerical) < 0.02 * e.dissipated && fabs(e.dissipated - first) < 0.01 * first,
                       "%s: %g J lost, not %g J; %g J unexplained", methods[i], e.dissipated, first,
                       e.numerical);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A run that goes on from a checkpoint has the bits of one that was not interrupted. */
-START_TEST(checkpoints_keep_branches)
+TEST(checkpoints_keep_branches)
 {
     static const char *const methods[] = {
         "{'method': 'be', 'dt': 0.01}",     "{'method': 'bdf2', 'dt': 0.01}",
@@ -133,10 +127,9 @@ START_TEST(checkpoints_keep_branches)
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         scene_resumes(falling(methods[i]), falling(methods[i]), 0.06, 0.1, methods[i]);
 }
-END_TEST
 
 /* Another model of the same cloth goes on with the branches of the one before. */
-START_TEST(a_new_model_keeps_branches)
+TEST(a_new_model_keeps_branches)
 {
     scene s = falling("{'method': 'be', 'dt': 0.01}"), other = falling("{'method': 'be', 'dt': 0.01}");
     const drape_term *bending = &s.model->terms[1];
@@ -152,10 +145,9 @@ START_TEST(a_new_model_keeps_branches)
     free(kept);
     scene_close(&s), scene_close(&other);
 }
-END_TEST
 
 /* A sim goes on with no model that its integrator refuses. */
-START_TEST(a_new_model_is_refused_as_a_first_one)
+TEST(a_new_model_is_refused_as_a_first_one)
 {
     scene s = sheet("{'type': 'damp.kelvin_voigt', 'beta': 0.001}", "{'edge': 'left'}",
                     "'integrator': {'method': 'ida'}, 'duration': 1"),
@@ -165,20 +157,17 @@ START_TEST(a_new_model_is_refused_as_a_first_one)
     scene_advance(&s, 0.01);
     scene_close(&s), scene_close(&other);
 }
-END_TEST
 
 /* Every derivative, at a random state a part of a time after the last one. */
-START_TEST(derivatives_agree_with_differences)
+TEST(derivatives_agree_with_differences)
 {
-    scene s = scene_model(
+    scoped_scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 5, 'rows': 5, 'width': 0.2, "
         "'height': 0.2}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 0.2}, "
         "'terms': ['stretch.curve', 'stretch.edge', 'bend.midedge', "
         "'bend.hinge', " MAXWELL "]}], 'duration': 1}");
     scene_check_derivatives(&s);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Refused ---- */
 
@@ -196,8 +185,7 @@ static void refused(const char *parameters, const char *method, const char *expe
         "'width': 1, 'height': 1}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': "
         "200},\n 'terms': ['stretch.cst', {'type': 'relax.maxwell', %s}]}], 'integrator': {'method': '%s'}}",
         parameters, method);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(text);
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_status status = drape_scene_parse(ctx, text, "s.json", &parsed);
     if (!status)
@@ -210,7 +198,7 @@ static void refused(const char *parameters, const char *method, const char *expe
     drape_scene_destroy(&parsed), drape_context_destroy(&ctx);
 }
 
-START_TEST(wrong_series_are_refused)
+TEST(wrong_series_are_refused)
 {
     static const char *const wrong[][2] = {
         {"'fraction_1': 0.3, 'time_1': 0",
@@ -228,19 +216,17 @@ START_TEST(wrong_series_are_refused)
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         refused(wrong[i][0], "be", wrong[i][1]);
 }
-END_TEST
 
-START_TEST(integrators_with_steps_of_their_own_refuse_it)
+TEST(integrators_with_steps_of_their_own_refuse_it)
 {
     static const char *const methods[] = {"ida", "radau", "dirk", "rosenbrock"};
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         refused("'fraction_1': 0.3, 'time_1': 1", methods[i],
                 "chooses its own steps, over which Maxwell branches");
 }
-END_TEST
 
 /* Of nothing that lasts there is no equilibrium: where the fractions have the sum 1, also by rounding. */
-START_TEST(equilibria_need_a_lasting_part)
+TEST(equilibria_need_a_lasting_part)
 {
     refused(
         "'fraction_1': 1, 'time_1': 1", "static",
@@ -249,13 +235,6 @@ START_TEST(equilibria_need_a_lasting_part)
     refused("'fraction_1': 0.1, 'time_1': 1, 'fraction_2': 0.2, 'time_2': 2, 'fraction_3': 0.3, 'time_3': 3, "
             "'fraction_4': 0.4, 'time_4': 4",
             "static", "nothing is left of the stiffness of cloth0");
-    scene s = sheet("{'type': 'relax.maxwell', 'fraction_1': 0.999999, 'time_1': 0.1}", "{'edge': 'left'}",
-                    "'integrator': {'method': 'static'}, 'duration': 1");
-    scene_close(&s);
+    scoped_scene s = sheet("{'type': 'relax.maxwell', 'fraction_1': 0.999999, 'time_1': 0.1}",
+                           "{'edge': 'left'}", "'integrator': {'method': 'static'}, 'duration': 1");
 }
-END_TEST
-
-SUITE("relaxation", coefficients_of_a_step, equilibria_are_relaxed, losses_are_in_the_balance,
-      checkpoints_keep_branches, a_new_model_keeps_branches, a_new_model_is_refused_as_a_first_one,
-      derivatives_agree_with_differences, wrong_series_are_refused,
-      integrators_with_steps_of_their_own_refuse_it, equilibria_need_a_lasting_part)

@@ -70,14 +70,14 @@ static void advance_patch(scene *s, double v, int count)
  * of methods of second order, which err by a multiple of 1/n^2, and 1600 of be, which errs by a multiple of
  * 1/n. Of a speed 4 and 8 of these are allowed, and twice as much of an energy: that of the sum of energies
  * is what the methods lose or gain themselves. */
-START_TEST(patches_rebound_by_their_coefficient)
+TEST(patches_rebound_by_their_coefficient)
 {
     const double coefficients[] = {0, 0.5, 1}, speeds[] = {0.5 * EPS, 2.5 * EPS, 10 * EPS};
     for (size_t k = 0; k < METHODS; k++)
         for (int i = 0; i < 9; i++) {
             const double e = coefficients[i / 3], v = speeds[i % 3], u = rebound_of(e, v);
             const double own = k == 0 ? 8.0 / 1600 : 4.0 / (100 * 100);
-            scene s = open_patch(methods[k], 1.0 / (k == 0 ? 3200 : 200), e, v);
+            scoped_scene s = open_patch(methods[k], 1.0 / (k == 0 ? 3200 : 200), e, v);
             advance_patch(&s, v, (int)(30 * (1 + v / u)));
             const drape_energy energy = drape_sim_energy(s.sim);
             const double got = sqrt(2 * energy.kinetic / MASS), all = MASS * v * v / 2;
@@ -89,18 +89,16 @@ START_TEST(patches_rebound_by_their_coefficient)
             ck_assert(e == 1 ? energy.dissipated == 0 : energy.dissipated > 0);
             if (v > 5 * EPS) /* the coefficient itself, up to (1 - e^2) (eps/v)^2 and, of 0, eps/v */
                 assert_below(fabs(got / v - e), e > 0 ? own + (1 - e * e) * EPS * EPS / (v * v) : EPS / v);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* A sheet that lies on the floor at rest does so at the same height, to the tolerance of Newton's method
  * over the weight of a node: equilibria have no velocity. */
-START_TEST(rest_is_the_same)
+TEST(rest_is_the_same)
 {
     double height[2];
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2,"
             " 'height': 0.2, 'transform': {'translate': [0, 0.009, 0]}},"
             " 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200},"
@@ -111,12 +109,8 @@ START_TEST(rest_is_the_same)
             k, DISTANCE);
         scene_advance(&s, 6);
         height[k] = drape_sim_positions(s.sim)[1];
-        scene_close(&s);
     }
     printf("# a sheet at rest: %.12g and %.12g m\n", height[0], height[1]);
     ck_assert(height[0] > 0.5 * DISTANCE && height[0] < DISTANCE);
     assert_below(fabs(height[0] - height[1]), 1e-9 * DISTANCE);
 }
-END_TEST
-
-SUITE("restitution", patches_rebound_by_their_coefficient, rest_is_the_same)

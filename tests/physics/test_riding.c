@@ -63,10 +63,10 @@ static drape_status follow(void *user, const drape_event *event)
     " 'integrator': {'method': '%s', 'dt': %g}, 'frame_rate': 101, 'duration': 0.25}"
 
 /* Coordinates of up to 1 m are rounded to 1e-16 some ten times. */
-START_TEST(pins_follow_a_body_with_every_method)
+TEST(pins_follow_a_body_with_every_method)
 {
     for (int m = 0; m < METHODS; m++) {
-        scene s = scene_open(CARRIED, methods[m], strcmp(methods[m], "verlet") == 0 ? 1e-4 : 0.008);
+        scoped_scene s = scene_open(CARRIED, methods[m], strcmp(methods[m], "verlet") == 0 ? 1e-4 : 0.008);
         followed f = {.s = &s};
         double x[3];
         ck_assert_int_eq(drape_sim_observe(s.sim, follow, &f), DRAPE_OK);
@@ -77,10 +77,8 @@ START_TEST(pins_follow_a_body_with_every_method)
                distance(x, drape_sim_positions(s.sim)));
         assert_below(f.largest, 1e-14);
         assert_below(distance(x, drape_sim_positions(s.sim)), 1e-14);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- A body that deforms ---- */
 
@@ -167,7 +165,7 @@ static void carried_to(int triangle, double t, const double *rest, double x[3])
 }
 
 /* On a named triangle, which is far from some of the nodes: they are carried by its plane. */
-START_TEST(pins_follow_a_triangle)
+TEST(pins_follow_a_triangle)
 {
     static const char *const some[] = {"be", "midpoint", "ida", "radau", "newton_k"};
     const frames_folder f = frames_folder_make();
@@ -177,7 +175,7 @@ START_TEST(pins_follow_a_triangle)
             char more[64];
             double largest = 0;
             snprintf(more, sizeof more, ", 'attach': 'body', 'triangle': %d", triangle);
-            scene s = scene_open(DEFORMING, more, f.path, f.path, "", some[m]);
+            scoped_scene s = scene_open(DEFORMING, more, f.path, f.path, "", some[m]);
             scene_advance(&s, 0.17);
             for (int32_t i = 0; i < 4; i++) {
                 double x[3];
@@ -185,16 +183,14 @@ START_TEST(pins_follow_a_triangle)
                 largest = fmax(largest, distance(x, drape_sim_positions(s.sim) + 3 * i));
             }
             assert_below(largest, 1e-13); /* weights of up to 10 multiply the rounding of 1e-16 m */
-            scene_close(&s);
         }
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* The nearest triangle of each node, on a body that turns as well, and then on paths of a host: the velocity
  * of a pin is the slope of its path, to the error of the difference, d^2/6 of a third derivative of 1e3 m/s3,
  * and the rounding of 1e-16 m over d. */
-START_TEST(velocities_are_slopes)
+TEST(velocities_are_slopes)
 {
     const frames_folder f = frames_folder_make();
     const double d = 1e-6, times[] = {0.03, 0.11, 0.16, 0.23, 0.27};
@@ -230,7 +226,6 @@ START_TEST(velocities_are_slopes)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* ---- Forces ---- */
 
@@ -255,11 +250,11 @@ static void rates_of(const scene *s, const double *before, double h, double forc
  * of the step, change by h times what acts from outside: gravity, on all nodes, and what the body gives,
  * the opposite of the force on it. Without friction, which acts on two points a gap apart. To the
  * residual, 1e-9 N on 20 nodes at 1 m. */
-START_TEST(force_and_torque_are_those_of_the_cloth)
+TEST(force_and_torque_are_those_of_the_cloth)
 {
     const double h = 0.005, origin[3] = {0};
     double before[60], force[3], torque[3], on_body[3], about[3];
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.5, 'height': "
         "0.375, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': "
         "200}, 'terms': ['stretch.edge', 'bend.hinge'],"
@@ -292,9 +287,7 @@ START_TEST(force_and_torque_are_those_of_the_cloth)
     }
     ck_assert_int_gt(compared, 40);
     ck_assert_double_gt(touched, 1e-3); /* the sheet touches the ball, too */
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- A body of the host's, which hangs from cloth ---- */
 
@@ -350,11 +343,12 @@ static body body_at(const scene *s, double mass)
 
 /* At rest the force on the body is its weight, without that of the nodes that it carries, which is in the
  * force already: to what is left of the motion, which the drag has damped by e^-20 from 1 N. */
-START_TEST(hanging_body_has_its_weight)
+TEST(hanging_body_has_its_weight)
 {
     const double h = 0.01, mass = 0.2;
     double force[3];
-    scene s = open_hanging(GRAVITY, h, "{'edge': 'top'}, ", ", {'type': 'damp.kelvin_voigt', 'beta': 0.02}");
+    scoped_scene s =
+        open_hanging(GRAVITY, h, "{'edge': 'top'}, ", ", {'type': 'damp.kelvin_voigt', 'beta': 0.02}");
     body b = body_at(&s, mass);
     for (int step = 1; step <= 800; step++) {
         /* gravity of the body alone: that of its nodes is a part of the force */
@@ -367,9 +361,4 @@ START_TEST(hanging_body_has_its_weight)
     ck_assert_double_lt(b.x[1], -0.5 - 1e-3); /* the cloth has stretched */
     assert_below(fabs(force[1] / (mass * GRAVITY) - 1), 1e-6);
     assert_below(hypot(force[0], force[2]), 1e-6 * mass * GRAVITY);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("riding", pins_follow_a_body_with_every_method, pins_follow_a_triangle, velocities_are_slopes,
-      force_and_torque_are_those_of_the_cloth, hanging_body_has_its_weight)

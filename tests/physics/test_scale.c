@@ -29,10 +29,10 @@ static double mean_fall(const scene *s)
 
 /* ---- The handkerchief ---- */
 
-START_TEST(a_fine_handkerchief_falls)
+TEST(a_fine_handkerchief_falls)
 {
     const double t = 0.1, h = 0.01;
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 100, 'rows': 100, 'width': 0.1,"
         "'height': 0.1}, 'material': {'young_modulus': 1e6, 'thickness': 2e-4, 'areal_density': 0.05},"
         "'terms': ['stretch.edge', 'bend.hinge']}], 'integrator': {'method': 'newton_k', 'dt': %g},"
@@ -40,9 +40,7 @@ START_TEST(a_fine_handkerchief_falls)
         h);
     scene_advance(&s, t);
     ck_assert_msg(fabs(mean_fall(&s) / (G * t * (t + h) / 2) - 1) < 0.01, "fell %g m", mean_fall(&s));
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Clamped strips ---- */
 
@@ -85,19 +83,17 @@ static scene open_strip(double size, double density, double thinness, double rat
 }
 
 /* The mesh of 20 x 3 nodes has a tip 0.24 % below the elastica's. */
-START_TEST(strips_sag_in_equilibrium)
+TEST(strips_sag_in_equilibrium)
 {
     for (int i = 0; i < COUNT(sizes); i++)
         for (int k = 0; k < COUNT(densities); k++) {
-            scene s = open_strip(sizes[i], densities[k], 1e-3, 0, "'method': 'static'");
+            scoped_scene s = open_strip(sizes[i], densities[k], 1e-3, 0, "'method': 'static'");
             scene_advance(&s, 1);
             const double sag = strip_sag(&s, sizes[i]);
             ck_assert_msg(fabs(sag / SAG - 1) < 0.01, "%g m, %g kg/m2: sags %g of its length, not %g",
                           sizes[i], densities[k], sag, SAG);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* ---- Residuals and loads ---- */
 
@@ -113,7 +109,7 @@ static drape_status note_residual(void *user, const drape_event *event)
 /* A tolerance in newtons that is far above the weight of the cloth is limited to 1 % of it: a tenth of a gram
  * sags although 1 N is tolerated. The strip's rounding error is some 1e-10 of its load, so every step
  * converges. */
-START_TEST(no_tolerance_hides_the_load)
+TEST(no_tolerance_hides_the_load)
 {
     for (int m = 0; drape_integrators[m]; m++) {
         const drape_integrator_ops *method = drape_integrators[m];
@@ -122,7 +118,7 @@ START_TEST(no_tolerance_hides_the_load)
         if (!method->tolerance || method->set_cheap)
             continue;
         snprintf(integrator, sizeof integrator, "'method': '%s', 'tolerance': 1", method->entry.name);
-        scene s = open_strip(0.1, 0.05, 0.05, 40, integrator);
+        scoped_scene s = open_strip(0.1, 0.05, 0.05, 40, integrator);
         for (int32_t i = 0; i < s.model->free_count; i++)
             mass += s.model->mass[s.model->node_of_free[i]] / s.model->free_count;
         ck_assert_int_eq(drape_sim_observe(s.sim, note_residual, &largest), DRAPE_OK);
@@ -132,20 +128,18 @@ START_TEST(no_tolerance_hides_the_load)
         ck_assert_double_le(largest, tolerance);
         /* the share of the load that is left without a reaction, and the 0.24 % of the mesh */
         ck_assert_msg(fabs(sag / SAG - 1) < 0.01 + 0.003, "%s: sags %g", method->entry.name, sag);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A tolerance below the rounding error of the forces in a stiff strip, E h = 1e6 N/m: they cancel at rest,
  * and steps are accepted as soon as no iteration can gain, instead of being halved until the run stops. The
  * error is at most some 40 roundings of E h times 0.6 m, 40 x 1.1e-16 x 6e5 N. */
-START_TEST(rounding_of_stiff_strips_is_accepted)
+TEST(rounding_of_stiff_strips_is_accepted)
 {
     static const char *const methods[] = {"be", "trbdf2", "static"};
     for (int m = 0; m < COUNT(methods); m++) {
         double largest = 0;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 12, 'edge_length': 0.05},"
             "'material': {'young_modulus': 1e9, 'thickness': 1e-3, 'areal_density': 0.2},"
             "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'nodes': [0, 1]}]}],"
@@ -156,14 +150,12 @@ START_TEST(rounding_of_stiff_strips_is_accepted)
         scene_advance(&s, 0.2);
         ck_assert_msg(s.rejected == 0 && largest > 1e-13 && largest < 3e-9, "%s: %ld rejected, residual %g N",
                       methods[m], s.rejected, largest);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* An equilibrium that is not reached: with on_failure accept, the best state of the flow, which is not called
  * converged. */
-START_TEST(statics_end_at_their_best)
+TEST(statics_end_at_their_best)
 {
     double last = INFINITY;
     for (int steps = 1; steps <= 4; steps++) {
@@ -171,7 +163,7 @@ START_TEST(statics_end_at_their_best)
         double residual = 0;
         snprintf(integrator, sizeof integrator,
                  "'method': 'static', 'max_pseudo_steps': %d, 'on_failure': 'accept'", steps);
-        scene s = open_strip(0.1, 0.05, 1e-3, 0, integrator);
+        scoped_scene s = open_strip(0.1, 0.05, 1e-3, 0, integrator);
         ck_assert_int_eq(drape_sim_observe(s.sim, note_residual, &residual), DRAPE_OK);
         scene_watch(&s);
         scene_advance(&s, 1);
@@ -179,24 +171,17 @@ START_TEST(statics_end_at_their_best)
         ck_assert_double_gt(residual, drape_sim_statistics(s.sim).tolerance);
         ck_assert_double_le(residual, last);
         last = residual;
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Cloth that nothing holds falls, and has no equilibrium; far from its start all digits of its forces are
  * lost, which must not be taken for convergence. */
-START_TEST(what_falls_has_no_equilibrium)
+TEST(what_falls_has_no_equilibrium)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 41, 'rows': 5, 'width': 0.01, "
         "'height': 0.001}, 'material': {'young_modulus': 3.924e8, 'poisson_ratio': 0, "
         "'thickness': 1e-5, 'areal_density': 0.01}, 'terms': ['stretch.cst', "
         "'bend.midedge']}], 'duration': 1, 'integrator': {'method': 'static'}}");
     ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_SOLVER);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("scale", a_fine_handkerchief_falls, strips_sag_in_equilibrium, no_tolerance_hides_the_load,
-      rounding_of_stiff_strips_is_accepted, statics_end_at_their_best, what_falls_has_no_equilibrium)

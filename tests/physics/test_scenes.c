@@ -118,7 +118,7 @@ static scene load(const beginning *b)
         status = drape_scene_set(parsed, b->set[i].pointer, b->set[i].value);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, status);
     drape_scene_destroy(&parsed);
     scene_start(&s, NULL);
     return s;
@@ -141,7 +141,7 @@ static void run(const beginning *of)
 {
     const beginning b = *of;
     const char *name = b.name;
-    scene s = load(&b);
+    scoped_scene s = load(&b);
     audit a = audit_of(s.ctx, s.model, s.model->contact.self && !b.explicit, !b.explicit);
     ck_assert_int_eq(drape_sim_observe(s.sim, audit_observe, &a), DRAPE_OK);
     scene_advance(&s, b.time);
@@ -152,10 +152,9 @@ static void run(const beginning *of)
     }
     ck_assert_msg(!b.touches || a.steps.node > -s.model->contact.distance, "%s: no contact: %g m", name,
                   a.steps.node);
-    scene_close(&s);
 }
 
-START_TEST(every_scene_begins_well)
+TEST(every_scene_begins_well)
 {
     static char names[MAX_SCENES][64];
     int count = find_scenes(names);
@@ -165,7 +164,6 @@ START_TEST(every_scene_begins_well)
         run(&b);
     }
 }
-END_TEST
 
 #define SQUARE                                                                                               \
     {COLUMNS, "20"}, {ROWS, "20"},                                                                           \
@@ -180,7 +178,7 @@ END_TEST
 /* A square sheet that is folded onto itself and one that crumples, 20 points a side, at CS184's thickness
  * and a tenth of it: in the sample, each at one of the two. bench/results/folds.csv has 50 points, and the
  * fold at 80. */
-START_TEST(no_edge_passes_a_triangle)
+TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {
         {"fold", 0.7, {SQUARE, {THICKNESS, "0.0095"}, {"/cloth/0/pins/0/track", SOON}}, .touches = true},
@@ -192,13 +190,12 @@ START_TEST(no_edge_passes_a_triangle)
         if (in_sample(i / 2, i % 2, 2))
             run(&folds[i]);
 }
-END_TEST
 
 /* The audit finds faults: the capstan's strip is moved into the bar, and then through itself. */
-START_TEST(an_audit_can_fail)
+TEST(an_audit_can_fail)
 {
     const beginning b = beginning_of("capstan");
-    scene s = load(&b);
+    scoped_scene s = load(&b);
     audit a = audit_of(s.ctx, s.model, true, true);
     drape_state *state = scene_state(&s);
     for (int32_t i = 0; i < s.model->node_count; i++)
@@ -212,8 +209,4 @@ START_TEST(an_audit_can_fail)
                                                                                     : 0.01);
     ck_assert_int_eq(audit_state(&a, state->x, 0, &a.steps), DRAPE_OK);
     ck_assert_int_gt(a.steps.intersections, 0);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("scenes", every_scene_begins_well, no_edge_passes_a_triangle, an_audit_can_fail)

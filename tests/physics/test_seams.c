@@ -35,9 +35,10 @@ static scene open_panels(double gap, double aside, const char *stitch, const cha
 
 /* At rest a closed seam carries the weight of what hangs from it, and opens by what its threads give: the
  * forces on the lower panel balance up to the residuals of its 75 unknowns, of at most 1e-9 N each. */
-START_TEST(carries_a_known_load)
+TEST(carries_a_known_load)
 {
-    scene s = open_panels(0, 0, ", 'closing': 0, 'stiffness': 37", "'method': 'static', 'tolerance': 1e-9");
+    scoped_scene s =
+        open_panels(0, 0, ", 'closing': 0, 'stiffness': 37", "'method': 'static', 'tolerance': 1e-9");
     drape_seam_report seam;
     scene_advance(&s, 2);
     ck_assert_int_eq(drape_sim_seam(s.sim, -1, NULL), 1);
@@ -56,24 +57,20 @@ START_TEST(carries_a_known_load)
     assert_below(fabs(seam.tension_max - 37 * seam.gap_max), 37 * 8 * DBL_EPSILON);
     /* threads hang within 1 degree of the vertical: the sum of magnitudes is that of the vertical parts */
     assert_below(fabs(seam.gap_mean - WEIGHT / (5 * 37)), 2e-4 * WEIGHT / (5 * 37));
-    scene_close(&s);
 }
-END_TEST
 
 /* Before a seam begins to close, its threads are as long as the gap: the lower panel hangs on them from the
  * beginning. */
-START_TEST(holds_before_it_closes)
+TEST(holds_before_it_closes)
 {
-    scene s = open_panels(0.05, 0, ", 'start': 10", "'dt': 0.01");
+    scoped_scene s = open_panels(0.05, 0, ", 'start': 10", "'dt': 0.01");
     drape_seam_report seam;
     scene_advance(&s, 1);
     drape_sim_seam(s.sim, 0, &seam);
     ck_assert_double_gt(seam.gap_mean, 0.05);
     ck_assert_double_lt(seam.gap_mean,
                         0.0504); /* by WEIGHT/(5 E h) = 1.6e-4, and a third of that for swings */
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Closing ---- */
 
@@ -87,7 +84,7 @@ static void close_by(const char *method)
 {
     char integrator[96];
     snprintf(integrator, sizeof integrator, "'method': '%s', 'dt': 0.01, 'rtol': 1e-5", method);
-    scene s = open_panels(0.05, 0.03, ", 'closing': 0.5", integrator);
+    scoped_scene s = open_panels(0.05, 0.03, ", 'closing': 0.5", integrator);
     drape_intersections found;
     drape_seam_report seam;
     const drape_energy start = drape_sim_energy(s.sim);
@@ -107,20 +104,18 @@ static void close_by(const char *method)
     /* work = stored + dissipated + numerical: of the lifting, and of what the swing dissipates */
     ck_assert_double_gt(stored + end.dissipated + end.numerical, 0.8 * stored);
     ck_assert_double_gt(end.numerical, -0.1 * WEIGHT * 0.05);
-    scene_close(&s);
 }
 
-START_TEST(closes)
+TEST(closes)
 {
     for (size_t k = 0; k < METHODS; k++)
         close_by(methods[k]);
 }
-END_TEST
 
 /* The fastest wave with a gap of 5 cm, of which threads still have 4 cm to go, or of a closed seam. */
 static double fastest_wave(const char *stitch)
 {
-    scene s = open_panels(0.05, 0, stitch, "'method': 'verlet', 'dt': 1e-3");
+    scoped_scene s = open_panels(0.05, 0, stitch, "'method': 'verlet', 'dt': 1e-3");
     drape_spectrum *spectrum;
     drape_arena arena = drape_arena_of(s.ctx);
     double omega, damping;
@@ -130,12 +125,11 @@ static double fastest_wave(const char *stitch)
     ck_assert_int_eq(drape_spectrum_create(&arena, s.sim->system, 20, &spectrum), DRAPE_OK);
     drape_spectrum_largest(spectrum, state, &omega, &damping);
     drape_arena_free(&arena);
-    scene_close(&s);
     return omega;
 }
 
 /* The stable step of explicit integrators counts the stiffness that threads will have. */
-START_TEST(stability_counts_slack_threads)
+TEST(stability_counts_slack_threads)
 {
     const double slack = fastest_wave(", 'start': 10, 'stiffness': 2000"),
                  closed = fastest_wave(", 'closing': 0, 'stiffness': 2000"),
@@ -143,21 +137,18 @@ START_TEST(stability_counts_slack_threads)
     ck_assert_double_eq(slack, closed);
     ck_assert_double_gt(closed, 2 * soft);
 }
-END_TEST
 
 /* Pieces that have nodes of a seam are neighbours: contact does not push it open, thin as the gap is in
  * comparison with the distance of layers. */
-START_TEST(is_not_in_contact)
+TEST(is_not_in_contact)
 {
-    scene s = open_panels(0, 0, ", 'closing': 0", "'dt': 0.01");
+    scoped_scene s = open_panels(0, 0, ", 'closing': 0", "'dt': 0.01");
     drape_seam_report seam;
     scene_advance(&s, 1);
     drape_sim_seam(s.sim, 0, &seam);
     ck_assert_double_lt(seam.gap_max, 0.5e-3);
     ck_assert_double_eq(drape_sim_energy(s.sim).contact, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Derivatives ---- */
 
@@ -179,17 +170,15 @@ static void check_model(const drape_model *model, const char *term, int rows_of_
 }
 
 /* Gradient, Hessian, symmetry, net force and torque, before, while and after the seam closes. */
-START_TEST(derivatives)
+TEST(derivatives)
 {
-    scene s = open_panels(0.01, 0.02, ", 'start': -0.0, 'closing': 1", "'dt': 0.01");
+    scoped_scene s = open_panels(0.01, 0.02, ", 'start': -0.0, 'closing': 1", "'dt': 0.01");
     check_model(s.model, "stitch", 5);
     ck_assert_int_eq(drape_model_check_derivatives(NULL, 1, NULL, 0, NULL), DRAPE_E_ARGUMENT);
     int32_t count = 0;
     ck_assert_int_eq(drape_model_check_derivatives(s.model, 1, NULL, 0, &count), DRAPE_OK);
     ck_assert_int_gt(count, 5);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Damping ---- */
 
@@ -211,11 +200,11 @@ END_TEST
  * e'(0) = 0, whose solution is known. A board gives by n k/(E h) = 1.8e-3 of what threads do, and its waves
  * take as much: 1 %. In the end half of the work of the weight is dissipated, 1/2 F^2/(n k). With (s/l)^2 =
  * 4e-8, the smoothing is not seen. */
-START_TEST(dashpots_damp_threads)
+TEST(dashpots_damp_threads)
 {
     const double c = 0.1, n = 3, k = 60, M = 0.2 * 0.2 * 0.2, F = M * 9.81, decay = n * c / (2 * M),
                  omega = sqrt(n * k / M - decay * decay);
-    scene s = scene_open(BOARDS, 0.5, 0.25, c);
+    scoped_scene s = scene_open(BOARDS, 0.5, 0.25, c);
     drape_seam_report seam;
     ck_assert_int_eq(drape_sim_seam(s.sim, -1, NULL), 2);
     double dissipated = 0;
@@ -233,9 +222,7 @@ START_TEST(dashpots_damp_threads)
     ck_assert_str_eq(seam.type, "dashpot");
     scene_advance(&s, 0.8);
     assert_below(fabs(drape_sim_energy(s.sim).dissipated - F * F / (2 * n * k)), 0.01 * F * F / (2 * n * k));
-    scene_close(&s);
 }
-END_TEST
 
 /* The force of the dashpots of BOARDS at velocities v: its sum and its torque, the sum of magnitudes, and
  * its power. */
@@ -263,10 +250,10 @@ static void measure_dashpots(const scene *s, const double *v, double net[6], dou
 
 /* Derivatives are exact, also where the nodes meet. Net force and torque vanish, to 100 roundings; power is
  * taken by any motion, but for those of all as one body. */
-START_TEST(dashpots_act_between_nodes)
+TEST(dashpots_act_between_nodes)
 {
     for (int i = 0; i < 2; i++) {
-        scene s = scene_open(BOARDS, i ? 0.45 : 0.5, 0.25, 0.3);
+        scoped_scene s = scene_open(BOARDS, i ? 0.45 : 0.5, 0.25, 0.3);
         double v[3 * 18], net[6], size, power;
         check_model(s.model, "dashpot", 2);
         scene_advance(&s, 0.01); /* threads are taut */
@@ -281,10 +268,8 @@ START_TEST(dashpots_act_between_nodes)
             vec3_cross(w, drape_sim_positions(s.sim) + 3 * (size_t)k, v + 3 * k);
         measure_dashpots(&s, v, net, &size, &power);
         assert_below(size, 100 * DBL_EPSILON * full);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- A term of a host ---- */
 
@@ -349,9 +334,9 @@ static const drape_term_ops buttons = {.struct_size = sizeof(drape_term_ops),
 
 static drape_status compile(drape_context *ctx, const char *type, int list, drape_model **model)
 {
-    drape_scene_def def;
+    drape_scene_def def = scene_def();
     drape_cloth_def cloths[2];
-    drape_seam_def seam;
+    drape_seam_def seam = seam_def();
     const int32_t nodes[] = {20, 21, 22}, far[] = {0, 1, 25};
     static const drape_setting settings[] = {{.name = "young_modulus", .number = 1e5},
                                              {.name = "thickness", .number = 1e-3},
@@ -361,7 +346,6 @@ static drape_status compile(drape_context *ctx, const char *type, int list, drap
                                          {.name = "width", .number = 0.2},
                                          {.name = "height", .number = 0.2}};
     static const drape_entry_def terms[] = {{.type = "stretch.cst"}};
-    drape_scene_def_init(&def, sizeof def);
     for (int c = 0; c < 2; c++) {
         drape_cloth_def_init(&cloths[c], sizeof *cloths);
         cloths[c].mesh.grid = (drape_entry_def){"square", grid, 4};
@@ -370,7 +354,6 @@ static drape_status compile(drape_context *ctx, const char *type, int list, drap
         cloths[c].terms = terms;
         cloths[c].term_count = 1;
     }
-    drape_seam_def_init(&seam, sizeof seam);
     seam.entry.type = type;
     seam.a.cloth = "cloth0";
     seam.a.nodes = nodes;
@@ -386,26 +369,23 @@ static drape_status compile(drape_context *ctx, const char *type, int list, drap
 
 /* The term has its user pointer everywhere, exact derivatives, and forces on both cloths, by structs
  * alone. */
-START_TEST(term_of_a_host)
+TEST(term_of_a_host)
 {
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     drape_seam_report seam;
     ck_assert_int_eq(drape_context_add_term(s.ctx, &buttons), DRAPE_OK);
     ck_assert_int_eq(drape_context_add_term(s.ctx, &buttons), DRAPE_E_ARGUMENT);
-    const drape_status status = compile(s.ctx, "host.buttons", 0, &s.model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    assert_ok(s.ctx, compile(s.ctx, "host.buttons", 0, &s.model));
     check_model(s.model, "host.buttons", 5);
     scene_start(&s, NULL);
     ck_assert_int_eq(drape_sim_seam(s.sim, 0, &seam), 1);
     ck_assert_str_eq(seam.type, "host.buttons");
     /* the rows of both sheets are at 0.2 - 0.05 i, upside down: 4 rows apart, and half of one */
     assert_below(fabs(seam.tension - 3 * 12.5 * 0.175), 1e-12);
-    scene_close(&s);
 }
-END_TEST
 
 /* What is wrong is refused where it is. */
-START_TEST(refusals)
+TEST(refusals)
 {
     scene s = scene_empty();
     drape_model *model = NULL;
@@ -418,8 +398,3 @@ START_TEST(refusals)
     ck_assert_int_eq(compile(s.ctx, NULL, 0, &model), DRAPE_E_ARGUMENT);
     drape_context_destroy(&s.ctx);
 }
-END_TEST
-
-SUITE("seams", carries_a_known_load, holds_before_it_closes, closes, stability_counts_slack_threads,
-      is_not_in_contact, derivatives, dashpots_damp_threads, dashpots_act_between_nodes, term_of_a_host,
-      refusals)

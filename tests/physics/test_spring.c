@@ -39,10 +39,10 @@ static double stretch(scene *s)
 /* Backward Euler, whose rate is a difference of lengths: v1 = (v0 - h w^2 x0)/(1 + h^2 w^2 + h c/m), x1 = x0
  * + h v1 exactly; and the dashpot takes c ((x1 - x0)/h)^2 h a step. A residual r moves x1 by r h^2/m at
  * most, and no step expands. */
-START_TEST(backward_euler_takes_the_dashpot_in_step_form)
+TEST(backward_euler_takes_the_dashpot_in_step_form)
 {
     const double c = 1.1, h = 0.03, tolerance = 1e-11, w2 = STIFFNESS / NODE_MASS;
-    scene s = oscillator(c, "'dt': 0.03, 'tolerance': 1e-11");
+    scoped_scene s = oscillator(c, "'dt': 0.03, 'tolerance': 1e-11");
     double x = 0, v = SPEED, diagnostic = 0, taken = 0;
     for (int n = 1; n <= 50; n++) {
         scene_advance(&s, n * h);
@@ -54,17 +54,15 @@ START_TEST(backward_euler_takes_the_dashpot_in_step_form)
     assert_below(diagnostic, 50 * h * h / NODE_MASS * (tolerance + force_noise(STIFFNESS + c / h, LENGTH)));
     /* relative to that of the first step, whose v has the same errors over h */
     assert_below(fabs(drape_sim_energy(s.sim).dissipated / taken - 1), 1e-9);
-    scene_close(&s);
 }
-END_TEST
 
 /* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot the energy and
  * the dissipation add up to the initial energy, up to the work of residuals of r over the path of the
  * nodes. */
-START_TEST(midpoint_accounts_for_every_joule)
+TEST(midpoint_accounts_for_every_joule)
 {
     const double tolerance = 1e-11;
-    scene s = oscillator(1.1, "'method': 'midpoint', 'dt': 0.03, 'tolerance': 1e-11");
+    scoped_scene s = oscillator(1.1, "'method': 'midpoint', 'dt': 0.03, 'tolerance': 1e-11");
     const double start = 2 * 0.5 * NODE_MASS * SPEED * SPEED;
     double path = 0, before = 0;
     for (int n = 1; n <= 50; n++) {
@@ -76,9 +74,7 @@ START_TEST(midpoint_accounts_for_every_joule)
     ck_assert_double_gt(e.dissipated, 0.9 * start);
     assert_below(fabs(e.kinetic + e.elastic + e.dissipated - start),
                  path * (tolerance + force_noise(STIFFNESS, LENGTH)) + 50 * 8 * DBL_EPSILON * start);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- A chain that hangs ---- */
 
@@ -87,12 +83,12 @@ END_TEST
 /* Spring j, from row j to j + 1, carries the weight below: (ROWS - 1 - j) m g. Its constant is k times the
  * mean of both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum
  * over the springs above it of (ROWS - 1) r/k. */
-START_TEST(chain_hangs_with_its_gradient)
+TEST(chain_hangs_with_its_gradient)
 {
     static const double gradients[] = {0, 0.4, -0.9};
     const double k = 200, g = 9.81, m = 0.05, tolerance = 1e-10;
     for (size_t i = 0; i < sizeof gradients / sizeof *gradients; i++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             CHAIN(9, 1.6) "'total_mass': %.17g},"
                           "'terms': [{'type': 'spring.structural', 'stiffness': 2000, 'factor': 0.1,"
                           "'gradient': %g}]}], 'gravity': [0, %g, 0],"
@@ -108,25 +104,24 @@ START_TEST(chain_hangs_with_its_gradient)
                 diagnostic = fmax(diagnostic, fabs(scene_state(&s)->x[3 * (2 * (j + 1) + column) + 1] - y));
         }
         assert_below(diagnostic, ROWS * (ROWS * tolerance + force_noise(k, 2)) / least);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Newton's third law ---- */
 
 /* r rows and c columns: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c
  * bend springs, each with its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
-START_TEST(springs_join_the_right_nodes)
+TEST(springs_join_the_right_nodes)
 {
     static const char *const kinds[] = {"spring.structural", "spring.shear", "spring.bend"};
-    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 50, 'rows': 50,"
-                          "'width': 98, 'height': 49},"
-                          "'material': {'young_modulus': 1, 'thickness': 1e-3, 'total_mass': 1},"
-                          "'terms': [{'type': 'spring.structural', 'stiffness': 1},"
-                          "{'type': 'spring.shear', 'stiffness': 1}, {'type': 'spring.bend', 'stiffness': 1, "
-                          "'rest_scale': 0.5}]}],"
-                          "'gravity': [0, 0, 0], 'duration': 1}");
+    scoped_scene s =
+        scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 50, 'rows': 50,"
+                    "'width': 98, 'height': 49},"
+                    "'material': {'young_modulus': 1, 'thickness': 1e-3, 'total_mass': 1},"
+                    "'terms': [{'type': 'spring.structural', 'stiffness': 1},"
+                    "{'type': 'spring.shear', 'stiffness': 1}, {'type': 'spring.bend', 'stiffness': 1, "
+                    "'rest_scale': 0.5}]}],"
+                    "'gravity': [0, 0, 0], 'duration': 1}");
     const double lengths[3][2] = {{2, 1}, {sqrt(5), sqrt(5)}, {0.5 * 4, 0.5 * 2}};
     int32_t total = 0;
     for (int t = 0; t < 3; t++) {
@@ -140,9 +135,7 @@ START_TEST(springs_join_the_right_nodes)
     }
     ck_assert_int_eq(total, 14502);
     ck_assert(!s.model->has_dissipation && !s.model->has_laws); /* dashpots of 0 cost nothing */
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- The strain limit ---- */
 
@@ -153,14 +146,14 @@ static double barrier_slope(double y)
 
 /* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: for a chosen y,
  * the weight is set to match. A residual r moves it by r over a stiffness above k. */
-START_TEST(limit_balances_its_load)
+TEST(limit_balances_its_load)
 {
     static const double windows[] = {-0.5, 1e-3, 0.3, 0.7, 0.97, 0.989};
     const double k = 3, big_k = 90, limit = 0.2, onset = limit / 2, w = limit - onset, tolerance = 1e-8;
     for (size_t i = 0; i < sizeof windows / sizeof *windows; i++) {
         const double y = windows[i], strain = onset + w * y;
         const double load = k * LENGTH * strain + (y > 0 ? big_k * LENGTH * w * barrier_slope(y) : 0);
-        scene s =
+        scoped_scene s =
             scene_open(CHAIN(2, 0.8) "'total_mass': %g}, 'terms': [{'type': 'spring.structural',"
                                      "'stiffness': %g}, {'type': 'limit.strain', 'limit': %g,"
                                      "'stiffness': %g}]}], 'gravity': [0, %.17g, 0],"
@@ -168,19 +161,18 @@ START_TEST(limit_balances_its_load)
                        4 * NODE_MASS, k, limit, big_k, -load / NODE_MASS, tolerance);
         scene_advance(&s, 1);
         assert_below(fabs(stretch(&s) - LENGTH * strain), (tolerance + force_noise(k, 1)) / k);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* b and its first two derivatives on both sides of the onset and of the cap, by the energy of one element:
  * they differ by no more than the next derivative, b''' <= 6 at the onset and about 2/cap^3 at the cap,
  * times the distance. */
-START_TEST(limit_is_smooth_twice)
+TEST(limit_is_smooth_twice)
 {
-    scene s = scene_model(CHAIN(2, 1) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
-                                      "'limit': 2}]}],"
-                                      "'gravity': [0, 0, 0], 'duration': 1}");
+    scoped_scene s =
+        scene_model(CHAIN(2, 1) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
+                                "'limit': 2}]}],"
+                                "'gravity': [0, 0, 0], 'duration': 1}");
     const drape_term *term = &s.model->terms[0];
     static const double at[] = {0, 0.99};
     static const double third[] = {7, 3e6}; /* 2/cap^3 and lower powers of 1/cap */
@@ -201,9 +193,7 @@ START_TEST(limit_is_smooth_twice)
         assert_below(fabs(h[1][7] - h[0][7]), 2 * d * third[i]);
         ck_assert(i == 0 || h[0][7] > 100); /* the second derivatives compared are not 0 */
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* CS184's pinned2 with 9 x 9 points: ks 5000, bend 0.2 ks, hanging by two corners, backward Euler at 1/30
  * s. */
@@ -235,7 +225,7 @@ static double largest_strain(const scene *s, const drape_elements *pairs)
 
 /* With the default stiffness, which is derived from the weight at 9.8 m/s2, a hundredfold load keeps every
  * spring below 10 %; without the limit the sheet exceeds it at once. */
-START_TEST(limit_holds_a_hundredfold_load)
+TEST(limit_holds_a_hundredfold_load)
 {
     static const double loads[] = {-9.8, -980};
     char limit[128];
@@ -243,7 +233,7 @@ START_TEST(limit_holds_a_hundredfold_load)
         /* 150 kg 9.8 m/s2 over 0.05 and the mean length of the springs, some 0.16 m */
         snprintf(limit, sizeof limit, ", {'type': 'limit.strain', 'over': 'springs'%s}",
                  i ? ", 'stiffness': 183000" : "");
-        scene s = hung_sheet(loads[i], limit), without = hung_sheet(loads[i], "");
+        scoped_scene s = hung_sheet(loads[i], limit), without = hung_sheet(loads[i], "");
         const drape_elements *pairs = &s.model->terms[3].elements;
         double max = 0, most_without = 0;
         for (int frame = 1; frame <= 60; frame++) {
@@ -257,35 +247,31 @@ START_TEST(limit_holds_a_hundredfold_load)
         printf("# strain %g without, %g with\n", most_without, max);
         assert_below(max, 0.1);
         ck_assert_double_gt(most_without, 0.1);
-        scene_close(&s);
-        scene_close(&without);
     }
 }
-END_TEST
 
 /* If the load exceeds the force of the barrier below its limit, about 2/cap K L w, no state beyond the
  * limit is accepted: the steps become small, and the message gives the reason. */
-START_TEST(overload_stops_with_the_reason)
+TEST(overload_stops_with_the_reason)
 {
-    scene s = scene_open(CHAIN(2, 0.8) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': "
-                                       "0.02}]}], 'gravity': [0, -9.8, 0], 'integrator': {'dt': 0.01},"
-                                       "'controller': {'type': 'halving', 'dt_min': 1e-3}, 'duration': 2}");
+    scoped_scene s =
+        scene_open(CHAIN(2, 0.8) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': "
+                                 "0.02}]}], 'gravity': [0, -9.8, 0], 'integrator': {'dt': 0.01},"
+                                 "'controller': {'type': 'halving', 'dt_min': 1e-3}, 'duration': 2}");
     const drape_status status = drape_sim_advance(s.sim, 2);
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
     ck_assert_msg(strstr(drape_context_message(s.ctx), "strain of a limited edge"), "%s",
                   drape_context_message(s.ctx));
     ck_assert_double_le(largest_strain(&s, &s.model->terms[0].elements), 0.1);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Degeneration ---- */
 
 /* A spring of length 0 has no direction: the state is rejected and the spring named. Just above the bound
  * all is finite. */
-START_TEST(collapsed_spring_is_named)
+TEST(collapsed_spring_is_named)
 {
-    scene s = oscillator(0.5, "'dt': 0.01");
+    scoped_scene s = oscillator(0.5, "'dt': 0.01");
     drape_state *state = scene_state(&s);
     drape_reason reason = DRAPE_REASON_CONVERGED;
     drape_diagnostic diagnostic;
@@ -304,11 +290,4 @@ START_TEST(collapsed_spring_is_named)
         ck_assert(isfinite(g[i]));
     /* The spring pushes down, the dashpot up; of numbers below 1, 1e-5 m are left. */
     assert_below(fabs(g[7] - STIFFNESS * (LENGTH - 1e-5) + 0.5 * SPEED) / g[7], 4 * DBL_EPSILON / 1e-5);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("spring", backward_euler_takes_the_dashpot_in_step_form, midpoint_accounts_for_every_joule,
-      chain_hangs_with_its_gradient, springs_join_the_right_nodes, limit_balances_its_load,
-      limit_is_smooth_twice, limit_holds_a_hundredfold_load, overload_stops_with_the_reason,
-      collapsed_spring_is_named)

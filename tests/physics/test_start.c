@@ -29,7 +29,7 @@ static double largest_distance(const double *x, const double *y, int32_t count)
 
 /* Half of the sheet is bent by half a turn around a cylinder of radius r: what is at x = 1/2 + s is at the
  * angle s / r, and behind the arc goes back at the height 2 r. Rounding of numbers of size 1. */
-START_TEST(a_fold_rolls_the_sheet_by_its_arc_length)
+TEST(a_fold_rolls_the_sheet_by_its_arc_length)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         char start[256];
@@ -37,7 +37,7 @@ START_TEST(a_fold_rolls_the_sheet_by_its_arc_length)
                  "'start': {'folds': [{'point': [0.5, 0, 3], 'axis': [0, 0, %d], 'side': [2, 0, 1], 'angle': "
                  "180, 'radius': 0.1}]}",
                  2 * sign);
-        scene s = sheet("be", start, 41);
+        scoped_scene s = sheet("be", start, 41);
         const double *x = scene_state(&s)->x;
         for (int32_t i = 0; i < s.model->node_count; i++) {
             const double *rest = s.model->rest + 3 * i, along = rest[0] - 0.5, angle = fmin(along / 0.1, PI);
@@ -46,36 +46,32 @@ START_TEST(a_fold_rolls_the_sheet_by_its_arc_length)
             ck_assert_double_le(largest_distance(x + 3 * i, to, 1), 8 * DBL_EPSILON);
         }
         ck_assert_ptr_eq(drape_model_rest_positions(s.model), s.model->rest);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A copy that is rotated and displaced has no forces: under every integrator it stays where it starts.
  * Forces of rounding are below 1e4 N/m^2 1e-3 m 1 m DBL_EPSILON = 2e-15 N; on a mass of 3e-4 kg they move a
  * node by less than 1e-12 m in 0.05 s. */
-START_TEST(a_rigid_copy_stays_where_it_starts)
+TEST(a_rigid_copy_stays_where_it_starts)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *method = drape_integrators[i]->entry.name;
-        scene s = sheet(method,
-                        "'start': {'transform': {'rotate': [1, 2, 3, 40], 'translate': [0.1, 0.2, 0.3]}}", 5);
+        scoped_scene s = sheet(
+            method, "'start': {'transform': {'rotate': [1, 2, 3, 40], 'translate': [0.1, 0.2, 0.3]}}", 5);
         double before[45];
         ck_assert_int_eq(s.model->node_count, 15);
         memcpy(before, scene_state(&s)->x, sizeof before);
         ck_assert_double_gt(largest_distance(before, s.model->rest, 15), 0.1);
         scene_advance(&s, 0.05);
         ck_assert_msg(largest_distance(before, scene_state(&s)->x, 15) < 1e-12, "%s", method);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* The law of Saint Venant and Kirchhoff under equal strains e = (1.1^2 - 1)/2 in the plane: E = A h Y / (1
  * - nu) e^2. At equilibrium all of it is gone. */
-START_TEST(a_strained_start_has_its_energy_and_loses_it_at_equilibrium)
+TEST(a_strained_start_has_its_energy_and_loses_it_at_equilibrium)
 {
-    scene s = sheet("static", "'start': {'transform': {'scale': [1.1, 1, 1.1]}}", 5);
+    scoped_scene s = sheet("static", "'start': {'transform': {'scale': [1.1, 1, 1.1]}}", 5);
     double elastic = 0, gravity = 0, strain = (1.1 * 1.1 - 1) / 2;
     const drape_state *state = scene_state(&s);
     drape_system_energy(s.sim->system,
@@ -88,16 +84,14 @@ START_TEST(a_strained_start_has_its_energy_and_loses_it_at_equilibrium)
     drape_system_energy(s.sim->system, &(drape_point){.x = end->x, .v = end->v, .internal = end->internal},
                         &elastic, &gravity);
     ck_assert_double_le(elastic, 1e-9 * exact);
-    scene_close(&s);
 }
-END_TEST
 
 /* v = v0 + w x (x - p), and p is the centre of mass unless it is given, so that the momentum is m v0. */
-START_TEST(spin_is_about_the_centre_of_mass_or_a_pivot)
+TEST(spin_is_about_the_centre_of_mass_or_a_pivot)
 {
     static const double w[3] = {3, -1, 2}, v0[3] = {0.5, 0, -0.25}, given[3] = {0.1, 0.2, -0.3};
     for (int pivoted = 0; pivoted < 2; pivoted++) {
-        scene s = sheet(
+        scoped_scene s = sheet(
             "be",
             pivoted ? "'velocity': [0.5, 0, -0.25], 'start': {'spin': [3, -1, 2], 'pivot': [0.1, 0.2, -0.3]}"
                     : "'velocity': [0.5, 0, -0.25], 'start': {'spin': [3, -1, 2]}",
@@ -120,15 +114,13 @@ START_TEST(spin_is_about_the_centre_of_mass_or_a_pivot)
         }
         for (int k = 0; k < 3 && !pivoted; k++)
             ck_assert_double_eq_tol(momentum[k], mass * v0[k], 64 * DBL_EPSILON * mass);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Pinned nodes begin at the start, not at rest, and a track displaces them from there. */
-START_TEST(pins_hold_the_start)
+TEST(pins_hold_the_start)
 {
-    scene s =
+    scoped_scene s =
         sheet("be",
               "'velocity': [1, 0, 0], 'start': {'transform': {'translate': [0, 5, 0]}},"
               "'pins': [{'edge': 'left'}, {'edge': 'right', 'track': [[0, [0, 0, 0]], [1, [0.5, 0, 0]]]}]",
@@ -141,9 +133,7 @@ START_TEST(pins_hold_the_start)
         if (s.model->pinned[i])
             ck_assert_double_le(largest_distance(state->x + 3 * i, to, 1), 4 * DBL_EPSILON);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Files and arrays ---- */
 
@@ -173,14 +163,14 @@ static void write_velocities(const char *path)
     write_file(path, data, sizeof data);
 }
 
-START_TEST(shape_and_velocities_come_from_files)
+TEST(shape_and_velocities_come_from_files)
 {
     static const double x[12] = {0, 0, 1, 1, 0, 1, 0, 2, 1, 1, 1, 1};
     static const char flat[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n";
     char shape[512], velocities[512];
     in_build("shape.obj", shape, sizeof shape);
     in_build("velocities.npy", velocities, sizeof velocities);
-    char *rest = strdup(shape);
+    scoped_memory char *rest = strdup(shape);
     strcpy(strstr(rest, "shape.obj"), "flat.obj");
     write_file(shape, obj, sizeof obj - 1);
     write_file(rest, flat, sizeof flat - 1);
@@ -196,12 +186,10 @@ START_TEST(shape_and_velocities_come_from_files)
         ck_assert_double_eq(scene_state(&s)->v[i], 0.5 * i + (i % 3 == 0));
     scene_close(&s);
     remove(shape), remove(rest), remove(velocities);
-    free(rest);
 }
-END_TEST
 
 /* The same from arrays of a host, whose faults are reported. */
-START_TEST(shape_and_velocities_come_from_arrays)
+TEST(shape_and_velocities_come_from_arrays)
 {
     static const double rest[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, x[9] = {0, 0, 1, 2, 0, 1, 0, 1, 1},
                         flat[9] = {0, 0, 1, 2, 0, 1, 1, 0, 1};
@@ -220,11 +208,9 @@ START_TEST(shape_and_velocities_come_from_arrays)
                        {NULL, flat, 9, 9, "degenerate"},
                        {NULL, x, 9, 3, "3 numbers in velocities"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        scene s = scene_empty();
-        drape_cloth_def cloth;
-        drape_scene_def def;
-        drape_cloth_def_init(&cloth, sizeof cloth);
-        drape_scene_def_init(&def, sizeof def);
+        scoped_scene s = scene_empty();
+        drape_cloth_def cloth = cloth_def();
+        drape_scene_def def = scene_def();
         cloth.mesh.positions = rest, cloth.mesh.node_count = 3;
         cloth.mesh.triangles = triangle, cloth.mesh.triangle_count = 1;
         cloth.material = material, cloth.material_count = 3;
@@ -242,12 +228,5 @@ START_TEST(shape_and_velocities_come_from_arrays)
             ck_assert_double_eq(largest_distance(scene_state(&s)->x, x, 3), 0);
             ck_assert_double_eq(largest_distance(scene_state(&s)->v, x, 3), 0);
         }
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("start", a_fold_rolls_the_sheet_by_its_arc_length, a_rigid_copy_stays_where_it_starts,
-      a_strained_start_has_its_energy_and_loses_it_at_equilibrium,
-      spin_is_about_the_centre_of_mass_or_a_pivot, pins_hold_the_start, shape_and_velocities_come_from_files,
-      shape_and_velocities_come_from_arrays)

@@ -32,14 +32,14 @@ static double along(const scene *s, const double *x, int32_t i, const double n[3
 
 /* A sheet on inclined rails slides as one that falls freely with the part of gravity along the rails, by
  * every method: to rounding of 1 m and, as both solve their steps to a residual, 1e-9 m. */
-START_TEST(a_rail_leaves_its_direction_free)
+TEST(a_rail_leaves_its_direction_free)
 {
     static const double g[3] = {1, -9, 2}, a[3] = {2.0 / 3, -1.0 / 3, 2.0 / 3};
     const double fall = g[0] * a[0] + g[1] * a[1] + g[2] * a[2];
     for (size_t i = 0; i < method_count; i++) {
         double x[2][27];
         for (int railed = 0; railed < 2; railed++) {
-            scene s = scene_open(
+            scoped_scene s = scene_open(
                 "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': "
                 "0.2, 'height': 0.2},"
                 "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, "
@@ -54,34 +54,32 @@ START_TEST(a_rail_leaves_its_direction_free)
             ck_assert_int_eq(s.model->free_count, 9);
             scene_advance(&s, 0.1);
             memcpy(x[railed], scene_state(&s)->x, sizeof x[railed]);
-            scene_close(&s);
         }
         for (int k = 0; k < 27; k++)
             ck_assert_msg(fabs(x[0][k] - x[1][k]) < 1e-9, "%s: %g", methods[i], x[0][k] - x[1][k]);
     }
 }
-END_TEST
 
 /* A sheet with its edges on an inclined plane: its nodes stay in it to rounding, and the results do not
  * depend on threads. */
-START_TEST(nodes_stay_in_an_inclined_plane)
+TEST(nodes_stay_in_an_inclined_plane)
 {
     static const double n[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7};
     for (int m = 0; drape_integrators[m]; m++) {
         uint64_t hash[2];
         for (int threads = 1; threads <= 3; threads += 2) {
-            scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, "
-                                  "'rows': 5, 'width': 0.3, 'height': 0.3},"
-                                  "'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
-                                  "'areal_density': 0.2},"
-                                  "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', "
-                                  "'beta': 0.01}],"
-                                  "'pins': [{'corner': 'top-left'}, {'edge': 'right', 'normal': [2, 3, "
-                                  "6]}, {'edge': 'left', 'normal': [2, 3, 6]}]}],"
-                                  "'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1}",
-                                  drape_integrators[m]->entry.name);
-            drape_sim_def def;
-            drape_sim_def_init(&def, sizeof def);
+            scoped_scene s =
+                scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, "
+                            "'rows': 5, 'width': 0.3, 'height': 0.3},"
+                            "'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
+                            "'areal_density': 0.2},"
+                            "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', "
+                            "'beta': 0.01}],"
+                            "'pins': [{'corner': 'top-left'}, {'edge': 'right', 'normal': [2, 3, "
+                            "6]}, {'edge': 'left', 'normal': [2, 3, 6]}]}],"
+                            "'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1}",
+                            drape_integrators[m]->entry.name);
+            drape_sim_def def = sim_def();
             def.threads = threads;
             scene_start(&s, &def);
             scene_advance(&s, 0.05);
@@ -94,29 +92,28 @@ START_TEST(nodes_stay_in_an_inclined_plane)
                     1e-14);
             }
             hash[threads / 2] = drape_state_hash(s.model, now);
-            scene_close(&s);
         }
         ck_assert_uint_eq(hash[0], hash[1]);
     }
 }
-END_TEST
 
 /* Supports in three planes leave nothing free; a plane given twice counts once; a pin that holds its node
  * altogether goes before them. The supports of a resting sheet carry its weight, along their directions
  * only. */
-START_TEST(supports_combine_and_carry_the_weight)
+TEST(supports_combine_and_carry_the_weight)
 {
-    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
-                         "'width': 0.3, 'height': 0.3,"
-                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
-                         "1e-3, 'areal_density': 0.2},"
-                         "'terms': ['stretch.cst', 'bend.hinge'],"
-                         "'pins': [{'box': [[-9, -9, -9], [9, 9, 9]], 'normal': [0, 1, 0]}, {'nodes': "
-                         "[5], 'normal': [0, -2, 0]},"
-                         "{'nodes': [0], 'normal': [1, 0, 0]}, {'nodes': [0], 'axis': [1, 1, 0]}, "
-                         "{'nodes': [3]}, {'nodes': [6], 'axis': [1, 0, 0]}]}],"
-                         "'gravity': [0, %g, 0], 'integrator': {'method': 'static'}, 'duration': 1}",
-                         -GRAVITY);
+    scoped_scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                   "'width': 0.3, 'height': 0.3,"
+                   "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                   "1e-3, 'areal_density': 0.2},"
+                   "'terms': ['stretch.cst', 'bend.hinge'],"
+                   "'pins': [{'box': [[-9, -9, -9], [9, 9, 9]], 'normal': [0, 1, 0]}, {'nodes': "
+                   "[5], 'normal': [0, -2, 0]},"
+                   "{'nodes': [0], 'normal': [1, 0, 0]}, {'nodes': [0], 'axis': [1, 1, 0]}, "
+                   "{'nodes': [3]}, {'nodes': [6], 'axis': [1, 0, 0]}]}],"
+                   "'gravity': [0, %g, 0], 'integrator': {'method': 'static'}, 'duration': 1}",
+                   -GRAVITY);
     double force[48], sum[3] = {0};
     ck_assert_int_eq(s.model->free_count, 14);
     ck_assert(s.model->pinned[0] && s.model->pinned[3]);
@@ -130,40 +127,38 @@ START_TEST(supports_combine_and_carry_the_weight)
             ck_assert_double_le(fabs(force[i]), 1e-12);
     }
     ck_assert_double_eq_tol(sum[1], GRAVITY * 0.2 * 0.09, 1e-12);
-    scene_close(&s);
 }
-END_TEST
 
 /* The matrix is that of the projected forces: differences of these along displacements that the supports
  * allow. */
-START_TEST(the_jacobian_is_that_of_the_projected_forces)
+TEST(the_jacobian_is_that_of_the_projected_forces)
 {
-    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
-                          "'width': 0.3, 'height': 0.3},"
-                          "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
-                          "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': "
-                          "0.01}, {'type': 'drag.viscous', 'coefficient': 1}],"
-                          "'pins': [{'row': 0, 'normal': [1, 2, 3]}, {'row': 2, 'axis': [1, -1, 1]}]}], "
-                          "'duration': 1}");
+    scoped_scene s =
+        scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, "
+                    "'width': 0.3, 'height': 0.3},"
+                    "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+                    "'terms': ['stretch.cst', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': "
+                    "0.01}, {'type': 'drag.viscous', 'coefficient': 1}],"
+                    "'pins': [{'row': 0, 'normal': [1, 2, 3]}, {'row': 2, 'axis': [1, -1, 1]}]}], "
+                    "'duration': 1}");
     scene_check_derivatives(&s);
-    scene_close(&s);
 }
-END_TEST
 
 /* A host's velocities lose what is held; placed cloth takes its directions along: on a slope of 30 degrees
  * the sheet, which was held in a level plane, slides along the slope. */
-START_TEST(states_and_placements_of_a_host)
+TEST(states_and_placements_of_a_host)
 {
-    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, "
-                         "'width': 0.3, 'height': 0.3,"
-                         "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
-                         "1e-3, 'areal_density': 0.2},"
-                         "'terms': ['stretch.cst'], 'velocity': [1, 2, 3], 'pins': [{'row': 0, 'normal': "
-                         "[0, 1, 0]},"
-                         "{'row': 1, 'normal': [0, 1, 0]}]}], 'integrator': {'dt': 0.01, 'tolerance': "
-                         "1e-12}, 'duration': 1}");
+    scoped_scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, "
+                   "'width': 0.3, 'height': 0.3,"
+                   "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': "
+                   "1e-3, 'areal_density': 0.2},"
+                   "'terms': ['stretch.cst'], 'velocity': [1, 2, 3], 'pins': [{'row': 0, 'normal': "
+                   "[0, 1, 0]},"
+                   "{'row': 1, 'normal': [0, 1, 0]}]}], 'integrator': {'dt': 0.01, 'tolerance': "
+                   "1e-12}, 'duration': 1}");
     double x[12], v[12];
-    drape_place_def def;
+    drape_place_def def = place_def();
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq(scene_state(&s)->v[i], i % 3 == 1 ? 0 : i % 3 + 1);
     memcpy(x, scene_state(&s)->x, sizeof x);
@@ -173,7 +168,6 @@ START_TEST(states_and_placements_of_a_host)
     ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq(scene_state(&s)->v[i], 0);
-    drape_place_def_init(&def, sizeof def);
     def.rotate[2] = 1, def.rotate[3] = 30;
     ck_assert_int_eq(drape_sim_place(s.sim, &def), DRAPE_OK);
     memcpy(x, scene_state(&s)->x, sizeof x);
@@ -182,18 +176,16 @@ START_TEST(states_and_placements_of_a_host)
     const double fall = 9.81 * 0.5 * 1e-4 * 55, to[3] = {-fall * sqrt(0.75), -fall * 0.5, 0};
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(scene_state(&s)->x[i] - x[i], to[i % 3], 1e-9);
-    scene_close(&s);
 }
-END_TEST
 
 /* The sides of a strip, held in planes of symmetry and clamped there, turn in these planes as the strip
  * bends: without lateral contraction it deflects as without clamps. The diagonals of the mesh twist free
  * sides by some 1e-6 of that. */
-START_TEST(a_clamped_edge_turns_in_its_plane)
+TEST(a_clamped_edge_turns_in_its_plane)
 {
     double drop[2];
     for (int clamped = 0; clamped < 2; clamped++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 11, 'rows': 4, 'width': 1, "
             "'height': 0.3,"
             "'orientation': 'horizontal'}, 'material': {'young_modulus': 12e6, 'poisson_ratio': 0, "
@@ -206,22 +198,20 @@ START_TEST(a_clamped_edge_turns_in_its_plane)
             clamped ? "true" : "false", clamped ? "true" : "false");
         scene_advance(&s, 1);
         drop[clamped] = -scene_state(&s)->x[3 * 10 + 1];
-        scene_close(&s);
     }
     ck_assert_double_gt(drop[0], 0.05);
     ck_assert_double_eq_tol(drop[1], drop[0], 1e-4 * drop[0]);
 }
-END_TEST
 
 /* ---- Pins that turn ---- */
 
 /* Both ends of a strip turn about the axis of the strip by 90 degrees in opposite senses, and one is drawn
  * away: at every time the nodes are where the rotation by 90 t degrees and the displacement take them, by
  * every method. */
-START_TEST(pins_turn_as_one_body_about_their_pivot)
+TEST(pins_turn_as_one_body_about_their_pivot)
 {
     for (int m = 0; drape_integrators[m]; m++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 3, 'width': 0.4, "
             "'height': 0.2,"
             "'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, "
@@ -250,15 +240,13 @@ START_TEST(pins_turn_as_one_body_about_their_pivot)
                               "%g",
                               drape_integrators[m]->entry.name, (int)i, x[k] - to[k]);
         }
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A state set by the host keeps nodes in their planes and on their lines: within 1e-9 of the scene. */
-START_TEST(a_state_off_a_plane_is_refused)
+TEST(a_state_off_a_plane_is_refused)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 0.2, 'height': "
         "0.2}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': "
         "['stretch.cst'], 'pins': [{'edge': 'left', 'normal': [1, 1, 0]}, {'edge': 'right', 'axis': [0, 0, "
@@ -280,9 +268,7 @@ START_TEST(a_state_off_a_plane_is_refused)
         if (held)
             ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "off the plane or line"));
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Supports that move ---- */
 
@@ -313,7 +299,7 @@ static scene carried(const char *method, const double V[3], bool moves)
  * in the balance of energies is what is lost at rest, up to the error of the rules that sum powers over a
  * step: (w h)^2/24 of a swing in the membrane, w = 240/s, which damping ends in the first tenth of the
  * time. */
-START_TEST(moving_supports_are_those_at_rest_in_a_moving_frame)
+TEST(moving_supports_are_those_at_rest_in_a_moving_frame)
 {
     static const double V[3] = {0.6, 0, 0.8};
     for (size_t i = 0; i < method_count; i++) {
@@ -342,17 +328,16 @@ START_TEST(moving_supports_are_those_at_rest_in_a_moving_frame)
         scene_close(&rest), scene_close(&moves);
     }
 }
-END_TEST
 
 /* A strip that an oblique plane draws out, and lets back after a kink: the balance of energies holds
  * under every method, so that the work of the supports is the right one. Those that choose their steps
  * keep it to their tolerance of 1e-6, in some hundred steps; the others of second order to (w h)^2/12
  * = 0.5 % of the work, with w = 240/s of the membrane as above, more at kinks. Backward Euler takes
  * energy by itself; newton_k is backward Euler. */
-START_TEST(the_work_of_moving_supports_is_in_the_balance)
+TEST(the_work_of_moving_supports_is_in_the_balance)
 {
     for (size_t i = 0; i < method_count; i++) {
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 4, 'width': 0.3, "
             "'height': "
             "0.1, 'orientation': 'horizontal'}, 'material': {'young_modulus': 1e4, 'poisson_ratio': 0.3, "
@@ -372,16 +357,14 @@ START_TEST(the_work_of_moving_supports_is_in_the_balance)
                              : s.sim->chosen.integrator->own_steps     ? 1e-3
                                                                        : 0.02;
         ck_assert_msg(fabs(lost) < share * work, "%s: %g of %g J", methods[i], lost, work);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Edges that share a corner hold it along one direction: with tracks that are equal along it, by other keys
  * or with other parts across it, the sheet moves as with one pin of all these nodes. So it does where pins of
  * equal tracks hold a corner in all directions, and where a plane moves as a corner does along it. Steps are
  * solved to 1e-11 N at masses of 5e-4 kg and more: ten of them differ by 10 h^2 1e-11 / 5e-4 = 2e-11 m. */
-START_TEST(pins_that_move_alike_share_nodes)
+TEST(pins_that_move_alike_share_nodes)
 {
     static const char *const pins[][2] = {
         {"{'edge': 'top', 'normal': [1, 0, 2], 'track': [[0, [0, 0, 0]], [1, [0, 0, 0.5]]]}, {'edge': "
@@ -400,7 +383,7 @@ START_TEST(pins_that_move_alike_share_nodes)
     for (size_t i = 0; i < sizeof pins / sizeof *pins; i++) {
         double x[2][27];
         for (int k = 0; k < 2; k++) {
-            scene s =
+            scoped_scene s =
                 scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, "
                            "'width': 0.2, 'height': 0.2}, 'material': {'young_modulus': 1e4, "
                            "'thickness': 1e-3, 'areal_density': 0.2}, 'terms': ['stretch.cst'], 'pins': "
@@ -408,18 +391,9 @@ START_TEST(pins_that_move_alike_share_nodes)
                            pins[i][k]);
             scene_advance(&s, 0.1);
             memcpy(x[k], scene_state(&s)->x, sizeof x[k]);
-            scene_close(&s);
         }
         ck_assert_double_gt(fabs(x[0][3 * 2 + 2]), 0.01);
         for (int j = 0; j < 27; j++)
             ck_assert_msg(fabs(x[0][j] - x[1][j]) <= 2e-11, "%zu: %d: %g", i, j, x[0][j] - x[1][j]);
     }
 }
-END_TEST
-
-SUITE("support", pins_that_move_alike_share_nodes, the_work_of_moving_supports_is_in_the_balance,
-      moving_supports_are_those_at_rest_in_a_moving_frame, a_state_off_a_plane_is_refused,
-      a_rail_leaves_its_direction_free, nodes_stay_in_an_inclined_plane,
-      supports_combine_and_carry_the_weight, the_jacobian_is_that_of_the_projected_forces,
-      states_and_placements_of_a_host, a_clamped_edge_turns_in_its_plane,
-      pins_turn_as_one_body_about_their_pivot)

@@ -63,14 +63,14 @@ static void middle_of(const scene *s, double middle[3])
  * drifts; within 1 % as it is not a point: w^2 r differs by its inertia over r^2, (0.01/0.1)^2/2, at most.
  * It turns with the floor but for the part of the creep along the path, the angle of a step, w h = 0.005,
  * of it at most. */
-START_TEST(a_patch_sticks_to_a_turntable)
+TEST(a_patch_sticks_to_a_turntable)
 {
     static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "rosenbrock", "radau"};
     const double radius = 0.1, rate = 5, begin = 0.1, t = 0.3;
     const double load = rate * rate * radius / (MU * GRAVITY), y = 1 - sqrt(1 - load);
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
         double middle[3];
-        scene s = open_patch(methods[i], radius, rate, 0.001);
+        scoped_scene s = open_patch(methods[i], radius, rate, 0.001);
         scene_advance(&s, begin);
         middle_of(&s, middle);
         const double first = hypot(middle[0], middle[2]);
@@ -81,24 +81,20 @@ START_TEST(a_patch_sticks_to_a_turntable)
                turned, remainder(rate * (begin + t), 2 * acos(-1.0)));
         assert_below(fabs(drift / (y * EPS * t) - 1), 0.01 + rate * 0.001);
         assert_below(fabs(remainder(turned - rate * (begin + t), 2 * acos(-1.0))), y * EPS * t / radius);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* With w^2 r = 2.4 mu g friction leaves at least 1.4 mu g outwards: more than half of mu g t^2 / 2 in 0.1
  * s. */
-START_TEST(a_patch_slides_off_a_fast_turntable)
+TEST(a_patch_slides_off_a_fast_turntable)
 {
     const double radius = 0.1, rate = sqrt(2.4 * MU * GRAVITY / radius), t = 0.1;
     double middle[3];
-    scene s = open_patch("be", radius, rate, 0.0025);
+    scoped_scene s = open_patch("be", radius, rate, 0.0025);
     scene_advance(&s, t);
     middle_of(&s, middle);
     ck_assert_double_gt(hypot(middle[0], middle[2]) - radius, 0.25 * MU * GRAVITY * t * t);
-    scene_close(&s);
 }
-END_TEST
 
 static double spin_of(const scene *s, const double *v)
 {
@@ -115,9 +111,9 @@ static double spin_of(const scene *s, const double *v)
  * and to its rounding. The energy that the disc gives is what the sheet has, what friction takes, and the
  * sum of m/2 |v1 - v0|^2 that the method takes; the account calls the last numerical. Without the work of
  * the turning disc it would be below -0.001 J. */
-START_TEST(torque_and_work_are_those_of_the_cloth)
+TEST(torque_and_work_are_those_of_the_cloth)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.2, 'height': "
         "0.2,"
         " 'transform': {'translate': [-0.09, 1e-3, 0.1]}},"
@@ -153,13 +149,11 @@ START_TEST(torque_and_work_are_those_of_the_cloth)
     ck_assert_double_gt(end.dissipated, 1e-3);
     assert_below(fabs(end.numerical - taken), 0.02 * end.dissipated);
     free(before);
-    scene_close(&s);
 }
-END_TEST
 
 /* A bar with sharp edges that turns about its middle under, through and over a sheet hung by its upper
  * edge, by up to a seventh of a turn in a step. */
-START_TEST(sharp_edges_turn_through_cloth)
+TEST(sharp_edges_turn_through_cloth)
 {
     static const char *const shapes[] = {
         "'type': 'box', 'center': [0, 0.28, 0], 'size': [0.05, 0.5, 0.08]",
@@ -168,7 +162,7 @@ START_TEST(sharp_edges_turn_through_cloth)
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++)
         for (int fast = 0; fast < (i == 0 ? 2 : 1); fast++) {
             crossings_run run = {0};
-            scene s = scene_open(
+            scoped_scene s = scene_open(
                 "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.4,"
                 " 'height': 0.4, 'orientation': 'vertical', 'transform': {'translate': [-0.2, 0.6, 0.15]}},"
                 " 'material': {'young_modulus': 2e4, 'thickness': 2e-3, 'density': 200},"
@@ -179,18 +173,15 @@ START_TEST(sharp_edges_turn_through_cloth)
                 " 'duration': 0.3}",
                 shapes[i], fast ? 400 : 240);
             ck_assert_int_eq(drape_sim_observe(s.sim, crossings_observe, &run), DRAPE_OK);
-            const drape_status status = drape_sim_advance(s.sim, 0.3);
-            ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+            assert_ok(s.ctx, drape_sim_advance(s.sim, 0.3));
             const drape_statistics got = drape_sim_statistics(s.sim);
             printf("# %.30s: %d states, %d crossed %s; %d rejected\n", shapes[i], (int)run.states,
                    (int)run.crossed_states, run.first, (int)got.steps_rejected);
             ck_assert_int_ge(run.states, 18);
             ck_assert_msg(run.crossed_states + run.crossed_frames == 0, "%s: at %g s %s", shapes[i],
                           run.first_time, run.first);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* ---- A host ---- */
 
@@ -216,9 +207,9 @@ static void wanted(double t, double q[4], double w[3])
 
 /* Poses that are sent frame by frame are reached, with their velocities; between them the angle is a
  * cubic, so that of a parabola is met everywhere. What is moved by a displacement alone stops turning. */
-START_TEST(a_host_turns_a_collider)
+TEST(a_host_turns_a_collider)
 {
-    scene s = open_hosted();
+    scoped_scene s = open_hosted();
     const double here[3] = {0}, up[3] = {0, 0.01, 0};
     double q[4], w[3], got[4], rate[3], pivot[3];
     for (int frame = 1; frame <= 10; frame++) {
@@ -249,9 +240,4 @@ START_TEST(a_host_turns_a_collider)
     ck_assert_int_eq(drape_sim_move_collider_pose(s.sim, 0, 0.05, here, q, here, NULL), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_sim_move_collider_pose(s.sim, 0, 0.05, here, q, here, fast), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_sim_move_collider_pose(s.sim, 1, 0.05, here, q, NULL, NULL), DRAPE_E_ARGUMENT);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("turning", a_patch_sticks_to_a_turntable, a_patch_slides_off_a_fast_turntable,
-      torque_and_work_are_those_of_the_cloth, sharp_edges_turn_through_cloth, a_host_turns_a_collider)

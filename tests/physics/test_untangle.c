@@ -88,10 +88,10 @@ static void start(scene *s, shape *bend, double *x)
 
 static void comes_apart(const tangle *t)
 {
-    scene s = open_model(t->scene);
+    scoped_scene s = open_model(t->scene);
     scene_start(&s, NULL);
     const size_t n = 3 * (size_t)s.model->node_count;
-    double *x = malloc(n * sizeof *x);
+    scoped_memory double *x = malloc(n * sizeof *x);
     drape_untangling u;
     start(&s, t->bend, x);
     const crossings before = count(&s, x);
@@ -112,8 +112,6 @@ static void comes_apart(const tangle *t)
     ck_assert_int_eq(drape_sim_observe(s.sim, watch, &s), DRAPE_OK);
     scene_advance(&s, 0.1);
     ck_assert_int_ge(s.accepted, 10);
-    scene_close(&s);
-    free(x);
 }
 
 /* The displacements and the strains are a few times what these tangles took when this was written: they are
@@ -186,17 +184,16 @@ static const tangle tangles[] = {
      NULL, 0.7, 0.05},
 };
 
-START_TEST(tangles_come_apart)
+TEST(tangles_come_apart)
 {
     for (size_t i = 0; i < sizeof tangles / sizeof *tangles; i++)
         comes_apart(&tangles[i]);
 }
-END_TEST
 
 /* Pinned nodes stay where they are, to the bit, and so does cloth that no tangle is near. */
-START_TEST(pins_and_what_is_far_stay)
+TEST(pins_and_what_is_far_stay)
 {
-    scene s = scene_open("{'drape': 1, 'cloth': [" SHEET(
+    scoped_scene s = scene_open("{'drape': 1, 'cloth': [" SHEET(
         "a", "0, 1, 0, 0",
         "-0.5, 0, 0.5") ", 'pins': [{'corner': 'top-left'}, "
                         "{'corner': 'bottom-right'}]}, " SHEET(
@@ -215,15 +212,13 @@ START_TEST(pins_and_what_is_far_stay)
     for (int32_t i = 0; i < s.model->node_count; i++)
         if (s.model->pinned[i] || i >= 200)
             ck_assert_mem_eq(x + 3 * (size_t)i, s.model->rest + 3 * (size_t)i, 3 * sizeof *x);
-    scene_close(&s);
 }
-END_TEST
 
 /* Sheets in one plane do not intersect, but have no gap, and neither side is that of one of them. */
-START_TEST(sheets_in_one_place_get_their_gap)
+TEST(sheets_in_one_place_get_their_gap)
 {
-    scene s = scene_open("{'drape': 1, 'cloth': [" SHEET("a", "0, 1, 0, 0", "-0.5, 0, 0.5") "}, " //
-                         SHEET("b", "0, 1, 0, 0", "-0.5, 0, 0.5") "}], " REST);
+    scoped_scene s = scene_open("{'drape': 1, 'cloth': [" SHEET("a", "0, 1, 0, 0", "-0.5, 0, 0.5") "}, " //
+                                SHEET("b", "0, 1, 0, 0", "-0.5, 0, 0.5") "}], " REST);
     drape_untangling u;
     ck_assert_msg(!drape_sim_untangle(s.sim, NULL, &u), "%s", drape_context_message(s.ctx));
     ck_assert_int_eq(u.pairs_before, 0);
@@ -236,27 +231,19 @@ START_TEST(sheets_in_one_place_get_their_gap)
                             drape_sim_positions(s.sim)[3 * i + 1]);
     /* gaps are the activation distance but for rounding, and the energy is its square: 1e-32 of some J */
     ck_assert_double_le(drape_sim_energy(s.sim).contact, 1e-20);
-    scene_close(&s);
 }
-END_TEST
 
 /* The same bits with any number of threads. */
-START_TEST(threads_do_not_matter)
+TEST(threads_do_not_matter)
 {
     uint64_t hash[2];
     for (int k = 0; k < 2; k++) {
-        scene s = open_model(tangles[2].scene);
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        scoped_scene s = open_model(tangles[2].scene);
+        drape_sim_def def = sim_def();
         def.threads = k ? 3 : 1;
         scene_start(&s, &def);
         ck_assert_int_eq(drape_sim_untangle(s.sim, NULL, NULL), DRAPE_OK);
         hash[k] = drape_sim_hash(s.sim);
-        scene_close(&s);
     }
     ck_assert_uint_eq(hash[0], hash[1]);
 }
-END_TEST
-
-SUITE("untangle", tangles_come_apart, pins_and_what_is_far_stay, sheets_in_one_place_get_their_gap,
-      threads_do_not_matter)

@@ -15,12 +15,12 @@
     "'gravity': [0, %g, 0], 'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 1}"
 
 /* The sum over the nodes is 1/2 rho C A |u.n| (u.n) n. Rounding: 60 triangles, about 20 operations each. */
-START_TEST(force_on_a_flat_sheet)
+TEST(force_on_a_flat_sheet)
 {
     const double wind[3] = {3, -2, 1.5}, n[3] = {0, cos(0.5), sin(0.5)}; /* y turned about x by 0.5 */
     char turn[64];
     snprintf(turn, sizeof turn, ", 'transform': {'rotate': [1, 0, 0, %.17g]}", 0.5 * 45 / atan(1));
-    scene s = scene_open(SHEET, turn, wind[0], wind[1], wind[2], 0.0);
+    scoped_scene s = scene_open(SHEET, turn, wind[0], wind[1], wind[2], 0.0);
     const drape_state *state = scene_state(&s);
     double g[90], along = vec3_dot(wind, n),
                   force = 0.5 * DENSITY * COEFFICIENT * 0.5 * 0.4 * fabs(along) * along;
@@ -33,20 +33,18 @@ START_TEST(force_on_a_flat_sheet)
             sum -= g[3 * i + k];
         ck_assert_double_eq_tol(sum, force * n[k], 1200 * DBL_EPSILON * fabs(force));
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* A sheet in wind at an angle of attack a has C_N = C (4 + pi) sin a/(4 + pi sin a) along its normal
  * (Rayleigh 1876), and friction along it; both derivatives. */
-START_TEST(plate_and_friction)
+TEST(plate_and_friction)
 {
     enum { NODES = 30 };
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
     const double pi = 4 * atan(1), degrees[] = {2, 20, 60, 90, 135};
     for (int k = 0; k < 5; k++) {
         const double a = degrees[k] * pi / 180, speed = 3;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': "
             "0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': "
             "200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'law': 'plate', 'coefficient': "
@@ -70,24 +68,20 @@ START_TEST(plate_and_friction)
         ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
         for (int i = 0; i < count; i++)
             ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Its derivatives in a wind; the tests of all terms have it in air at rest. */
-START_TEST(derivatives_in_a_wind)
+TEST(derivatives_in_a_wind)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
-    scene s = scene_open(SHEET, "", 3.0, -2.0, 1.5, -9.81);
+    scoped_scene s = scene_open(SHEET, "", 3.0, -2.0, 1.5, -9.81);
     int count = 0;
     ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
     ck_assert_int_gt(count, 0);
     for (int i = 0; i < count; i++)
         ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
-    scene_close(&s);
 }
-END_TEST
 
 /* A wind as a host may give it: rotating, sheared and changing with time; dw/dx is its matrix. */
 static void swirl(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
@@ -106,13 +100,14 @@ static void swirl(void *user, double t, int32_t count, const double *x, double *
 
 /* dg/dx includes the change of the wind as nodes move, dg/dv does not: for both drags, their sum in the
  * system, and D. */
-START_TEST(derivatives_in_the_wind_of_a_host)
+TEST(derivatives_in_the_wind_of_a_host)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
-    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, "
-                         "'width': 0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': "
-                         "1e-3, 'density': 200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'wind': "
-                         "[3, -2, 1.5]}, {'type': 'drag.viscous', 'coefficient': 0.7}]}], 'duration': 1}");
+    scoped_scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, "
+                   "'width': 0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': "
+                   "1e-3, 'density': 200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'wind': "
+                   "[3, -2, 1.5]}, {'type': 'drag.viscous', 'coefficient': 0.7}]}], 'duration': 1}");
     for (int still = 0; still < 2; still++) {
         int count = 0, drags = 0;
         ck_assert_int_eq(drape_sim_set_wind(s.sim, still ? NULL : swirl, NULL), DRAPE_OK);
@@ -123,9 +118,7 @@ START_TEST(derivatives_in_the_wind_of_a_host)
         }
         ck_assert_int_ge(drags, 2);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /*
  * A horizontal sheet stays flat: every node has the same share of weight and wind. Backward Euler's v1 = v0
@@ -136,7 +129,7 @@ END_TEST
  */
 static void fall_level(double wind, double gravity)
 {
-    scene s = scene_open(SHEET, "", 0.0, wind, 0.0, -gravity);
+    scoped_scene s = scene_open(SHEET, "", 0.0, wind, 0.0, -gravity);
     double h = 0.01, k = DENSITY * COEFFICIENT / (2 * 0.2), u = wind;
     scene_advance(&s, 1);
     for (int n = 0; n < 100; n++)
@@ -150,15 +143,10 @@ static void fall_level(double wind, double gravity)
     drape_energy e = drape_sim_energy(s.sim);
     ck_assert(wind > 0 ? e.dissipated < 0
                        : e.dissipated > 0); /* wind adds energy, air at rest dissipates it */
-    scene_close(&s);
 }
 
-START_TEST(a_level_sheet_falls_and_flies)
+TEST(a_level_sheet_falls_and_flies)
 {
     fall_level(0, 9.81); /* to its terminal speed, sqrt(g/k) = 1.655 m/s */
     fall_level(4, 0);    /* the wind carries it along */
 }
-END_TEST
-
-SUITE("wind", force_on_a_flat_sheet, plate_and_friction, derivatives_in_a_wind,
-      derivatives_in_the_wind_of_a_host, a_level_sheet_falls_and_flies)

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drape/drape.h"
+#include "support/context.h"
 
 typedef struct bytes {
     unsigned char *data;
@@ -26,7 +26,13 @@ static inline drape_status bytes_keep(void *user, const void *data, size_t size)
     return DRAPE_OK;
 }
 
-/* data is to be freed. */
+static inline void bytes_free(bytes *b)
+{
+    free(b->data);
+}
+
+#define scoped_bytes SCOPED(bytes_free) bytes
+
 static inline bytes bytes_save(drape_sim *sim)
 {
     bytes b = {0};

@@ -62,7 +62,7 @@ static inline void dep_run(const dep_case *c)
     const double duration = 3;
     int64_t counted = 0, count = 0;
     dep_log log = {.honest = true, .converged = true};
-    scene s = dep_scene(c);
+    scoped_scene s = dep_scene(c);
     ck_assert_int_eq(drape_sim_observe(s.sim, dep_note, &log), DRAPE_OK);
     const drape_status status = drape_sim_advance(s.sim, duration);
     ck_assert_msg(status == DRAPE_OK, "%s: %s", c->name, drape_context_message(s.ctx));
@@ -86,7 +86,6 @@ static inline void dep_run(const dep_case *c)
     /* No node can be lower than its shortest path along edges to the nearest pin; NaN fails this too. */
     for (int32_t i = 0; i < s.model->node_count; i++)
         ck_assert(fabs(drape_sim_positions(s.sim)[3 * i + 1]) < 1.2 * 0.1 * c->side);
-    scene_close(&s);
 }
 
 #endif

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drape/drape.h"
+#include "support/context.h"
 
 typedef struct failing_allocator {
     long fail_at;     /* number of the call that fails, from 1, after the context's own; 0: none */
@@ -47,10 +47,9 @@ static inline void failing_release(void *user, void *block)
 
 static inline drape_context *failing_context(failing_allocator *memory)
 {
-    drape_context_def def;
+    drape_context_def def = context_def();
     drape_context *ctx = NULL;
     const long fail_at = memory->fail_at;
-    drape_context_def_init(&def, sizeof def);
     def.allocate = failing_allocate;
     def.release = failing_release;
     def.allocator_user = memory;

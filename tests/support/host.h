@@ -9,44 +9,57 @@
 #include <string.h>
 
 #include "drape/drape.h"
+#include "support/context.h"
 #include "support/failing_allocator.h"
 
 typedef struct host {
     drape_context *ctx;
     drape_model *model;
     drape_sim *sim;
+    failing_allocator *memory; /* of the context */
 } host;
 
-/* Compiles a scene and makes a sim, in a context on the given allocator; in the format ' stands for ". */
-static inline host open_scene(failing_allocator *memory, const char *format, ...)
+static inline host empty_host(void)
+{
+    failing_allocator *memory = calloc(1, sizeof *memory);
+    ck_assert_ptr_nonnull(memory);
+    return (host){.ctx = failing_context(memory), .memory = memory};
+}
+
+/* Compiles a scene and makes a sim; in the format ' stands for ". */
+__attribute__((format(printf, 1, 2))) static inline host open_scene(const char *format, ...)
 {
     char text[4096];
-    host h = {.ctx = failing_context(memory)};
+    host h = empty_host();
     drape_scene *scene = NULL;
     va_list values;
     va_start(values, format);
     int length = vsnprintf(text, sizeof text, format, values);
     va_end(values);
     ck_assert(length > 0 && length < (int)sizeof text);
-    for (char *c = text; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    quote(text);
     drape_status status = drape_scene_parse(h.ctx, text, "s.json", &scene);
     if (!status)
         status = drape_scene_compile(scene, &h.model);
     if (!status)
         status = drape_sim_create(h.ctx, h.model, NULL, &h.sim);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(h.ctx));
+    assert_ok(h.ctx, status);
     drape_scene_destroy(&scene);
     return h;
 }
 
-static inline void close_scene(host *h, failing_allocator *memory)
+static inline void close_scene(host *h)
 {
     drape_sim_destroy(&h->sim);
     drape_model_destroy(&h->model);
     drape_context_destroy(&h->ctx);
-    ck_assert_int_eq(memory->live, 0);
+    if (h->memory)
+        ck_assert_int_eq(h->memory->live, 0);
+    free(h->memory);
+    h->memory = NULL;
 }
+
+#define scoped_host SCOPED(close_scene) host
 
 static inline void good(const host *h, drape_status status)
 {

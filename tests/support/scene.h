@@ -43,9 +43,7 @@ static inline scene scene_vmodel(const char *format, va_list values)
     drape_scene *parsed = NULL;
     const int length = vsnprintf(text, sizeof text, format, values);
     ck_assert(length > 0 && length < (int)sizeof text);
-    for (char *c = text; *c; c++)
-        if (*c == '\'')
-            *c = '"';
+    quote(text);
     drape_status status = drape_scene_parse(s.ctx, text, "test", &parsed);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
@@ -67,8 +65,7 @@ __attribute__((format(printf, 1, 2))) static inline scene scene_model(const char
 /* Creates a sim of the scene's model; def NULL: as the scene says. */
 static inline void scene_start(scene *s, const drape_sim_def *def)
 {
-    const drape_status status = drape_sim_create(s->ctx, s->model, def, &s->sim);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_create(s->ctx, s->model, def, &s->sim));
 }
 
 /* Model and sim. */
@@ -88,6 +85,8 @@ static inline void scene_close(scene *s)
     drape_model_destroy(&s->model);
     drape_context_destroy(&s->ctx);
 }
+
+#define scoped_scene SCOPED(scene_close) scene
 
 /* The present state, which may be changed before the first step. */
 static inline drape_state *scene_state(scene *s)
@@ -119,8 +118,7 @@ static inline void scene_watch(scene *s)
 
 static inline void scene_advance(scene *s, double t)
 {
-    const drape_status status = drape_sim_advance(s->sim, t);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_advance(s->sim, t));
 }
 
 /* Every derivative of the scene's model agrees with differences at three random states, those of the whole

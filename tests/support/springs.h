@@ -6,6 +6,7 @@
 #include "entries/models.h"
 #include "solvers/multigrid.h"
 #include "solvers/pcg.h"
+#include "support/context.h"
 
 #include <stdlib.h>
 
@@ -128,6 +129,8 @@ static inline void close_sheet(sheet *q)
     drape_arena_destroy(&q->arena);
     drape_context_destroy(&q->ctx);
 }
+
+#define scoped_sheet SCOPED(close_sheet) sheet
 
 static inline void factor(sheet *q)
 {

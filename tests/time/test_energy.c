@@ -21,8 +21,7 @@
 
 static drape_sim_def def_of(const char *method, double dt, const drape_setting *setting)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.controller = "fixed";
     def.dt = dt;
@@ -34,18 +33,17 @@ static drape_sim_def def_of(const char *method, double dt, const drape_setting *
 static double numerical(const char *method, const char *terms, double dt, const drape_setting *setting)
 {
     const drape_sim_def def = def_of(method, dt, setting);
-    scene s = scene_model(SHEET, terms);
+    scoped_scene s = scene_model(SHEET, terms);
     scene_start(&s, &def);
     scene_advance(&s, END);
     const double energy = drape_sim_energy(s.sim).numerical;
-    scene_close(&s);
     return energy;
 }
 
 /* Slopes of the remainder, as in test_order.c. midpoint conserves quadratic invariants only: what it gains
  * or loses in other energies, and in the work of damping taken at the middle of the step, is of its order;
  * so are the gains and losses of trbdf2. */
-START_TEST(the_remainder_of_one_step_methods_has_their_order)
+TEST(the_remainder_of_one_step_methods_has_their_order)
 {
     static const char *const methods[] = {"be", "midpoint", "trbdf2"}, *const terms[] = {"", DAMPED};
     for (int i = 0; i < 3; i++)
@@ -57,14 +55,13 @@ START_TEST(the_remainder_of_one_step_methods_has_their_order)
             ck_assert_double_eq_tol(log2(fabs(a / b)), i > 0 ? 2 : 1, 0.15);
         }
 }
-END_TEST
 
 /* Backward Euler loses energy in every step: at least 1/2 m |v1 - v0|^2 if the energy is convex. For hinges
  * and springs under pressure the energy is not convex, but at this h they are slow. */
-START_TEST(be_only_takes_energy)
+TEST(be_only_takes_energy)
 {
     const drape_sim_def def = def_of("be", END / 100, NULL);
-    scene s = scene_model(SHEET, "");
+    scoped_scene s = scene_model(SHEET, "");
     scene_start(&s, &def);
     double before = 0;
     for (int k = 1; k <= 100; k++) {
@@ -73,14 +70,12 @@ START_TEST(be_only_takes_energy)
         ck_assert_msg(now > before, "step %d: %g J after %g J", k, now, before);
         before = now;
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* With order 5 the error at a time falls as rtol^(5/6), and so does the remainder without damping. With
  * damping, its work is summed by the trapezoidal rule, of order 2 in the steps, which go with rtol^(1/6):
  * only as rtol^(1/3), one decade for three. A factor 2 is left for the loosest tolerances. */
-START_TEST(the_remainder_of_ida_falls_with_rtol)
+TEST(the_remainder_of_ida_falls_with_rtol)
 {
     static const char *const terms[] = {"", DAMPED};
     static const double powers[] = {5.0 / 6, 1.0 / 3};
@@ -95,14 +90,13 @@ START_TEST(the_remainder_of_ida_falls_with_rtol)
         assert_below(last, 2 * first * pow(1e-6, powers[k]));
     }
 }
-END_TEST
 
 /* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta
  * + coefficient/areal density. From x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and the dissipation is the
  * decrease of E. The springs are linear up to (a/L)^2 = 1e-8. midpoint shifts phases of w h by (w h)^2/12
  * of them and takes work at the middle of the step: an error of at most (w h)^2 of E0; ida's trapezoidal
  * rule has an error of (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
-START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
+TEST(dissipated_is_the_work_of_damping_in_closed_form)
 {
     const double length = 0.1, density = 0.2, stiffness = 3 * sqrt(3.0) / 2 * 1e3,
                  mass = density * sqrt(3.0) / 2 * length * length;
@@ -117,17 +111,18 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
                          wd = sqrt(w * w - d * d);
             drape_sim_def def = def_of(methods[i], h, i ? atol : NULL);
             def.integrator_setting_count = i ? 3 : 0;
-            scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, "
-                                  "'edge_length': %g, 'transform': {'translate': "
-                                  "[%.17g, 0, %.17g]}}, 'material': {'young_modulus': 1e6, 'thickness': "
-                                  "1e-3, 'areal_density': %g},"
-                                  "'terms': ['stretch.edge', {'type': 'damp.kelvin_voigt', 'beta': %.17g}, "
-                                  "{'type': 'drag.viscous', 'coefficient': %.17g}],"
-                                  "'velocity': [%.17g, 0, 0], 'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, "
-                                  "8]}]}], 'gravity': [0, 0, 0],"
-                                  "'integrator': {'tolerance': 1e-12}, 'duration': 1}",
-                                  length, -1.5 * length, sqrt(3.0) / 2 * length, density, betas[kind] / w,
-                                  drags[kind] * w * density, speed);
+            scoped_scene s =
+                scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, "
+                            "'edge_length': %g, 'transform': {'translate': "
+                            "[%.17g, 0, %.17g]}}, 'material': {'young_modulus': 1e6, 'thickness': "
+                            "1e-3, 'areal_density': %g},"
+                            "'terms': ['stretch.edge', {'type': 'damp.kelvin_voigt', 'beta': %.17g}, "
+                            "{'type': 'drag.viscous', 'coefficient': %.17g}],"
+                            "'velocity': [%.17g, 0, 0], 'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, "
+                            "8]}]}], 'gravity': [0, 0, 0],"
+                            "'integrator': {'tolerance': 1e-12}, 'duration': 1}",
+                            length, -1.5 * length, sqrt(3.0) / 2 * length, density, betas[kind] / w,
+                            drags[kind] * w * density, speed);
             scene_start(&s, &def);
             scene_advance(&s, end);
             const double decay = exp(-d * end), x = speed / wd * decay * sin(wd * end),
@@ -140,17 +135,15 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
             ck_assert_double_gt(missing, 0.3 * before);
             const double step = i ? 0.3 * 0.3 / 12 : 0.02 * 0.02;
             assert_below(fabs(e.dissipated - missing) / before, step + 1e-6);
-            scene_close(&s);
         }
 }
-END_TEST
 
 /* A curtain hangs by its upper edge, at rest under its own weight, and is lifted by H at a speed u that is
  * slow compared with its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T
  * + p) = m g H + u p. Here p is the momentum at the end, m u if the curtain moves along; waves that are not
  * yet damped, and the integrator's account of the jumps of the pins' own kinetic energy, are of the same
  * size. So the work is m g H within 2 m u^2: 0.5 % of it. */
-START_TEST(pins_that_lift_a_sheet_do_m_g_h)
+TEST(pins_that_lift_a_sheet_do_m_g_h)
 {
     const double height = 0.1, speed = 0.05;
     for (int i = 0; drape_integrators[i]; i++) {
@@ -159,7 +152,7 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
             continue;
         drape_sim_def def = def_of(method->entry.name, 0.01, NULL);
         def.controller = "halving";
-        scene s = scene_model(
+        scoped_scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
             "'height': 0.4,"
             "'orientation': 'vertical'}, 'material': {'young_modulus': 2e5, 'thickness': 1e-3, "
@@ -185,10 +178,8 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
         assert_below(fabs(after.gravity - before.gravity - weight), slack);
         assert_below(fabs(after.dissipated - before.dissipated) + fabs(after.numerical - before.numerical),
                      slack);
-        scene_close(&s);
     }
 }
-END_TEST
 
 static int64_t refused_for_energy(const scene *s)
 {
@@ -224,7 +215,7 @@ static drape_status note_swing(void *user, const drape_event *event)
  * decrease of gravity and 1/2 m g L. A gain of up to 1e-6 in a step is not judged, 3600 times at most. With
  * outdated contraction rates, ida completed such runs with twice the energy of their start; it took three
  * times as many steps, and two of them had to be refused. */
-START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
+TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
 {
     int completed = 0;
     for (int i = 0; drape_integrators[i]; i++) {
@@ -233,7 +224,7 @@ START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
             continue;
         drape_sim_def def = def_of(method->entry.name, 1.0 / 30, NULL);
         def.controller = "halving";
-        scene s = scene_model(
+        scoped_scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 1, "
             "'height': 1},"
             "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'areal_density': 150, 'mass': 'uniform'},"
@@ -254,11 +245,9 @@ START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
         if (method->own_steps)
             ck_assert(ended && s.accepted < 2000 && refused_for_energy(&s) < 2);
         completed += ended;
-        scene_close(&s);
     }
     ck_assert_int_ge(completed, 6);
 }
-END_TEST
 
 /* ---- What is dissipated is bounded by what the motion loses ---- */
 
@@ -292,7 +281,7 @@ static drape_status run_faulted(const char *name, scene *s)
 }
 
 /* The remainder may fall by what the method gains in undamped motion, 1 % of what the run received. */
-START_TEST(no_more_is_dissipated_than_the_motion_lost)
+TEST(no_more_is_dissipated_than_the_motion_lost)
 {
     static const char *const names[] = {"ida", "dirk", "rosenbrock", "radau"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
@@ -307,11 +296,10 @@ START_TEST(no_more_is_dissipated_than_the_motion_lost)
         scene_close(&s);
     }
 }
-END_TEST
 
 /* Energy out of nothing ends the run, however much is said to be dissipated. Of methods that continue from
  * the velocities that they are given. */
-START_TEST(a_method_that_gains_is_stopped_whatever_it_says)
+TEST(a_method_that_gains_is_stopped_whatever_it_says)
 {
     static const char *const names[] = {"rosenbrock", "radau"};
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
@@ -324,20 +312,19 @@ START_TEST(a_method_that_gains_is_stopped_whatever_it_says)
             scene_close(&s);
         }
 }
-END_TEST
 
 /* ---- The check of energy in real time ---- */
 
 /* Where all nodes are pinned nothing but the account bounds a step of a method that chooses its own. Both
  * halves of the track have 100 steps, so that the rules for the work leave P'' T^2/P, of some units, times
  * 1e-4/12 of it. */
-START_TEST(the_account_of_pinned_nodes_closes)
+TEST(the_account_of_pinned_nodes_closes)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *method = drape_integrators[i];
         if (!method->own_steps || method->steady_state)
             continue;
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.4, "
             "'height': 0.3}, 'material': {'young_modulus': 2e4, 'thickness': 1e-3, 'areal_density': 0.2}, "
             "'terms': ['stretch.cst', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}], 'pins': [{'edge': "
@@ -350,13 +337,5 @@ START_TEST(the_account_of_pinned_nodes_closes)
         printf("# %s: %.3g of %.3g J\n", method->entry.name, e.numerical, e.dissipated);
         ck_assert_double_gt(e.dissipated, 1e-5);
         assert_below(fabs(e.numerical), 4e-4 * (e.dissipated + e.elastic + e.gravity));
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("energy", the_account_of_pinned_nodes_closes, the_remainder_of_one_step_methods_has_their_order,
-      be_only_takes_energy, the_remainder_of_ida_falls_with_rtol,
-      dissipated_is_the_work_of_damping_in_closed_form, pins_that_lift_a_sheet_do_m_g_h,
-      completed_runs_have_gained_no_energy_from_stiff_springs, no_more_is_dissipated_than_the_motion_lost,
-      a_method_that_gains_is_stopped_whatever_it_says)

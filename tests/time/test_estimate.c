@@ -80,7 +80,7 @@ static int compare_numbers(const void *a, const void *b)
  * most a sixth of the steps of a run is off by more than the bound and estimated at less than a tenth: where
  * a stiff sheet is swung or meets the ball it buckles at a saddle, near which corrections become short and
  * then long again. */
-START_TEST(the_estimate_is_near_the_true_error)
+TEST(the_estimate_is_near_the_true_error)
 {
     static const source sources[] = {{"", 16, SOFT, EDGES, PINS},
                                      {"", 10, STIFF, EDGES, SWUNG},
@@ -89,10 +89,9 @@ START_TEST(the_estimate_is_near_the_true_error)
                                      {BALL, 10, SOFT, EDGES, "'pins': []"}};
     for (size_t i = 0; i < sizeof sources / sizeof *sources; i++)
         for (int least = 0; least < 2; least++) {
-            scene s = open(&sources[i], "newton_k", least ? ", 'error': 1e6" : "");
-            drape_sim_def be;
+            scoped_scene s = open(&sources[i], "newton_k", least ? ", 'error': 1e6" : "");
+            drape_sim_def be = sim_def();
             pair p = {.error = {.n = 3 * (size_t)s.model->node_count, .x = p.x, .v = p.v}};
-            drape_sim_def_init(&be, sizeof be);
             be.integrator = "be";
             be.integrator_settings =
                 (drape_setting[]){{.name = "dt", .number = DT}, {.name = "tolerance", .number = 1e-7}};
@@ -108,10 +107,8 @@ START_TEST(the_estimate_is_near_the_true_error)
                           p.count);
             ck_assert_int_le(p.far_below, STEPS / 6);
             drape_sim_destroy(&p.error.exact);
-            scene_close(&s);
         }
 }
-END_TEST
 
 typedef struct first_step {
     step_error error;
@@ -133,15 +130,15 @@ static drape_status count_kept(void *user, const drape_event *event)
 }
 
 /* A tighter bound takes more iterations, each step until it is within the bound, and comes nearer to be. */
-START_TEST(iterations_follow_while_it_is_above_the_bound)
+TEST(iterations_follow_while_it_is_above_the_bound)
 {
     const char *const settings[] = {", 'error': 1e6", ", 'error': 1e-5"};
     double off[2];
     int64_t iterations[2];
-    scene exact = open(&denim, "be", CONVERGED);
+    scoped_scene exact = open(&denim, "be", CONVERGED);
     scene_advance(&exact, STEPS * DT);
     for (int i = 0; i < 2; i++) {
-        scene s = open(&denim, "newton_k", settings[i]);
+        scoped_scene s = open(&denim, "newton_k", settings[i]);
         long steps[2] = {0};
         if (i == 1)
             ck_assert_int_eq(drape_sim_observe(s.sim, count_kept, steps), DRAPE_OK);
@@ -152,19 +149,16 @@ START_TEST(iterations_follow_while_it_is_above_the_bound)
         iterations[i] = done.newton_iterations;
         ck_assert(done.error_bound == (i == 0 ? 1e6 : 1e-5) && done.error_max >= done.error_last);
         ck_assert_int_eq(done.steps_above_error, steps[1]);
-        scene_close(&s);
     }
     ck_assert_int_gt(iterations[1], iterations[0]);
     ck_assert_msg(off[1] < 0.1 * off[0], "%g m, %g m", off[0], off[1]);
-    scene_close(&exact);
 }
-END_TEST
 
 /* The default bound is a thousandth of the diagonal. be has an estimate and no bound; integrators that choose
  * their steps have neither. */
-START_TEST(the_default_bound_is_a_thousandth_of_the_size)
+TEST(the_default_bound_is_a_thousandth_of_the_size)
 {
-    scene s = open(&soft, "newton_k", ""), be = open(&soft, "be", ""), other = open(&soft, "ida", "");
+    scoped_scene s = open(&soft, "newton_k", ""), be = open(&soft, "be", ""), other = open(&soft, "ida", "");
     scene_advance(&s, DT);
     scene_advance(&be, DT);
     scene_advance(&other, DT);
@@ -175,22 +169,18 @@ START_TEST(the_default_bound_is_a_thousandth_of_the_size)
     const drape_statistics none = drape_sim_statistics(other.sim);
     ck_assert(isnan(none.error_bound) && isnan(none.error_max) && isnan(none.error_last));
     ck_assert_int_eq(none.steps_above_error, 0);
-    scene_close(&s);
-    scene_close(&be);
-    scene_close(&other);
 }
-END_TEST
 
 /* With all the time of the world a frame takes the same iterations as a run without a budget, with none only
  * the least, and says that it is above its bound. */
-START_TEST(a_budget_limits_the_iterations)
+TEST(a_budget_limits_the_iterations)
 {
     const char *const tight = ", 'error': 1e-7";
-    scene free_run = open(&denim, "newton_k", tight);
+    scoped_scene free_run = open(&denim, "newton_k", tight);
     scene_advance(&free_run, 6 * DT);
     const int64_t all = drape_sim_statistics(free_run.sim).newton_iterations;
     for (int plenty = 0; plenty < 2; plenty++) {
-        scene s = open(&denim, "newton_k", tight);
+        scoped_scene s = open(&denim, "newton_k", tight);
         drape_realtime r = {0};
         int64_t above = 0;
         for (int i = 0; i < 6; i++) {
@@ -211,11 +201,8 @@ START_TEST(a_budget_limits_the_iterations)
         const double from = drape_sim_time(s.sim);
         scene_advance(&s, from + DT);
         ck_assert_int_gt(drape_sim_statistics(s.sim).newton_iterations, made + 1);
-        scene_close(&s);
     }
-    scene_close(&free_run);
 }
-END_TEST
 
 static drape_status keep_attempt(void *user, const drape_event *event)
 {
@@ -226,10 +213,10 @@ static drape_status keep_attempt(void *user, const drape_event *event)
 
 /* Nodes that fly apart at random with 1 km/s go 16 m in a step of 1/60 s, where the sheet would hold them
  * within 1.4 m: one iteration is nowhere near that, and the step is rejected. At 0.1 m/s it is accepted. */
-START_TEST(a_step_that_is_lost_is_rejected)
+TEST(a_step_that_is_lost_is_rejected)
 {
     for (int lost = 0; lost < 2; lost++) {
-        scene s = open(&soft, "newton_k", "");
+        scoped_scene s = open(&soft, "newton_k", "");
         drape_attempt first = {0};
         uint64_t seed = 3;
         double *v = scene_state(&s)->v;
@@ -245,30 +232,26 @@ START_TEST(a_step_that_is_lost_is_rejected)
         printf("# estimated %g m: %s\n", first.error, first.reason);
         ck_assert(first.accepted == !lost && (first.error > SIZE) == lost);
         ck_assert(!lost || strcmp(first.reason, "residual") == 0);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Its cost ---- */
 
 static double off_after(const source *of, const char *settings, int steps, drape_statistics *done)
 {
-    scene exact = open(of, "be", CONVERGED), s = open(of, "newton_k", settings);
+    scoped_scene exact = open(of, "be", CONVERGED), s = open(of, "newton_k", settings);
     scene_advance(&exact, steps * DT);
     scene_advance(&s, steps * DT);
     const double off = rms_distance(drape_sim_positions(s.sim), drape_sim_positions(exact.sim),
                                     3 * (size_t)s.model->node_count);
     *done = drape_sim_statistics(s.sim);
-    scene_close(&s);
-    scene_close(&exact);
     return off;
 }
 
 /* A stiff sheet that hangs takes one iteration in nearly all steps after the first ones, and three
  * evaluations of F: at the guess, after the correction and after the estimate, which is made. It stays within
  * two thousandths of its size. */
-START_TEST(steps_without_contact_take_one_iteration)
+TEST(steps_without_contact_take_one_iteration)
 {
     static const source stiff = {"", 10, STIFF, EDGES, PINS};
     drape_statistics done;
@@ -278,19 +261,12 @@ START_TEST(steps_without_contact_take_one_iteration)
     ck_assert_int_le(done.newton_iterations, STEPS + STEPS / 2);
     ck_assert_int_le(done.residuals, STEPS + 3 * done.newton_iterations);
 }
-END_TEST
 
 /* Where pins jump to 2 m/s, by a third of an edge in the first step, the linearized equation leads to a guess
  * from which two iterations are enough, and a third shows it, because one of them is shortened. */
-START_TEST(pins_that_jump_take_the_sheet_along)
+TEST(pins_that_jump_take_the_sheet_along)
 {
     drape_statistics done;
     ck_assert_double_lt(off_after(&denim, "", 1, &done), 1e-3 * SIZE);
     ck_assert_int_le(done.newton_iterations, 3);
 }
-END_TEST
-
-SUITE("estimate", the_estimate_is_near_the_true_error, iterations_follow_while_it_is_above_the_bound,
-      the_default_bound_is_a_thousandth_of_the_size, a_budget_limits_the_iterations,
-      a_step_that_is_lost_is_rejected, steps_without_contact_take_one_iteration,
-      pins_that_jump_take_the_sheet_along)

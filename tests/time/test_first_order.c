@@ -41,15 +41,15 @@ static double distance(const scene *a, const scene *b)
 
 /* rtol 1e-11 of the size a step, in less than 1e3 steps, whose errors do not grow on a sheet with drag:
  * 1e-8 of the size at most. */
-START_TEST(they_agree_at_tight_tolerances)
+TEST(they_agree_at_tight_tolerances)
 {
     for (int moved = 0; moved < 2; moved++) {
-        scene first = {NULL};
+        scoped_scene first = {NULL};
         const char *track = moved ? TRACK : "";
         for (int i = 0; drape_integrators[i]; i++) {
             if (!controls_error(drape_integrators[i]))
                 continue;
-            scene s = scene_open(SHEET, track, drape_integrators[i]->entry.name, 1e-11, "");
+            scoped_scene s = scene_open(SHEET, track, drape_integrators[i]->entry.name, 1e-11, "");
             scene_advance(&s, END);
             if (!first.sim) {
                 first = s;
@@ -58,12 +58,9 @@ START_TEST(they_agree_at_tight_tolerances)
             printf("# %s: %.3g m, %lld steps\n", drape_integrators[i]->entry.name, distance(&first, &s),
                    (long long)drape_sim_statistics(s.sim).steps_accepted);
             assert_below(distance(&first, &s), 1e-8 * SIZE);
-            scene_close(&s);
         }
-        scene_close(&first);
     }
 }
-END_TEST
 
 /* Errors at rtol 1e-4 and 1e-9, as a power of the number of steps: its order, on average over the steps,
  * or down to one less. The steps at rtol 1e-4 are some 20, of which the first ones are as short as those
@@ -76,63 +73,58 @@ static void check_order(const char *method, const char *setting, int order)
     double error[2];
     int64_t steps[2];
     snprintf(more, sizeof more, ", '%s': %d", setting, order);
-    scene reference = scene_open(SHEET, "", "ida", 1e-11, "");
+    scoped_scene reference = scene_open(SHEET, "", "ida", 1e-11, "");
     scene_advance(&reference, END);
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(SHEET, "", method, k ? 1e-9 : 1e-4, more);
+        scoped_scene s = scene_open(SHEET, "", method, k ? 1e-9 : 1e-4, more);
         scene_advance(&s, END);
         error[k] = distance(&reference, &s);
         steps[k] = drape_sim_statistics(s.sim).steps_accepted;
-        scene_close(&s);
     }
     const double slope = log(error[0] / error[1]) / log((double)steps[1] / (double)steps[0]);
     printf("# %s, order %d: %lld to %lld steps, %.3g to %.3g m: %.2f\n", method, order, (long long)steps[0],
            (long long)steps[1], error[0], error[1], slope);
     ck_assert_double_ge(slope, order - 1);
-    scene_close(&reference);
 }
 
-START_TEST(dirk_has_the_order_that_is_set)
+TEST(dirk_has_the_order_that_is_set)
 {
     for (int order = 2; order <= 5; order++)
         check_order("dirk", "order", order);
 }
-END_TEST
 
 /* Thousands of steps end within their rounding errors of the end, but the run ends there, to the last
  * bit; so do parts of it. */
-START_TEST(runs_end_at_their_ends)
+TEST(runs_end_at_their_ends)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         if (!controls_error(drape_integrators[i]))
             continue;
-        scene s = scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, 1e-3, ", 'max_step': 1e-4");
+        scoped_scene s =
+            scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, 1e-3, ", 'max_step': 1e-4");
         for (double end = 0.1; end < 0.4; end += 0.1) {
             scene_advance(&s, end);
             ck_assert_double_eq(drape_sim_time(s.sim), end);
         }
         ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 3000);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* What pins put in comes out, and what dashpots take is counted: the remainder is the error of the method,
  * and of the trapezoidal rule in two powers, which falls with the tolerance: rtol 1e-3 and 1e-7 of the
  * scene's size in each of the 10 to 100 steps that dissipate most. */
-START_TEST(the_energy_balance_is_kept)
+TEST(the_energy_balance_is_kept)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         if (!controls_error(drape_integrators[i]))
             continue;
         double remainder[2];
         for (int k = 0; k < 2; k++) {
-            scene s = scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, k ? 1e-7 : 1e-3, "");
+            scoped_scene s = scene_open(SHEET, TRACK, drape_integrators[i]->entry.name, k ? 1e-7 : 1e-3, "");
             scene_advance(&s, 0.3);
             const drape_energy e = drape_sim_energy(s.sim);
             ck_assert_double_gt(e.dissipated, 1e-4);
             remainder[k] = fabs(e.numerical) / e.dissipated;
-            scene_close(&s);
         }
         printf("# %s: remainder %.3g and %.3g of what is dissipated\n", drape_integrators[i]->entry.name,
                remainder[0], remainder[1]);
@@ -140,7 +132,6 @@ START_TEST(the_energy_balance_is_kept)
         assert_below(remainder[1], 1e-4);
     }
 }
-END_TEST
 
 /* ---- An oscillator ---- */
 
@@ -149,6 +140,3 @@ typedef struct decay {
     double h, factor, before, worst;
     int count;
 } decay;
-
-SUITE("first_order", they_agree_at_tight_tolerances, dirk_has_the_order_that_is_set, runs_end_at_their_ends,
-      the_energy_balance_is_kept)

@@ -44,13 +44,12 @@ static double distance(const scene *s, const double *a, const double *b)
 
 static double *positions_at(const char *pins, double rtol, const char *more, double t)
 {
-    scene s = sheet(pins, rtol, more);
+    scoped_scene s = sheet(pins, rtol, more);
     const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
     double *x = malloc(size);
     ck_assert_ptr_nonnull(x);
     scene_advance(&s, t);
     memcpy(x, drape_sim_positions(s.sim), size);
-    scene_close(&s);
     return x;
 }
 
@@ -66,7 +65,7 @@ static void falls(const char *pins, int max_order)
     double first = 0, before = INFINITY, *reference = positions_at(pins, 1e-10, ", 'max_order': 5", END);
     snprintf(order, sizeof order, ", 'max_order': %d", max_order);
     for (int k = 2; k <= 8; k++) {
-        scene s = sheet(pins, pow(10, -k), order);
+        scoped_scene s = sheet(pins, pow(10, -k), order);
         scene_advance(&s, END);
         const double error = distance(&s, reference, drape_sim_positions(s.sim));
         printf("# max_order %d, rtol 1e-%d: error %.3g m, %lld steps\n", max_order, k, error,
@@ -74,23 +73,20 @@ static void falls(const char *pins, int max_order)
         ck_assert_msg(error <= 2 * before, "rtol 1e-%d: error %g m, before %g m", k, error, before);
         first = k == 2 ? error : first;
         before = error;
-        scene_close(&s);
     }
     assert_below(before, 1e-3 * first);
     free(reference);
 }
 
-START_TEST(error_falls_with_rtol_in_order_2)
+TEST(error_falls_with_rtol_in_order_2)
 {
     falls(HUNG, 2);
 }
-END_TEST
 
-START_TEST(error_falls_with_rtol_in_order_5)
+TEST(error_falls_with_rtol_in_order_5)
 {
     falls(HUNG, 5);
 }
-END_TEST
 
 static scene after(const char *more, double rtol)
 {
@@ -101,23 +97,21 @@ static scene after(const char *more, double rtol)
 
 static uint64_t hash_after(const char *more, double rtol)
 {
-    scene s = after(more, rtol);
+    scoped_scene s = after(more, rtol);
     const uint64_t hash = drape_sim_hash(s.sim);
-    scene_close(&s);
     return hash;
 }
 
 static long long steps_after(const char *more, double rtol)
 {
-    scene s = after(more, rtol);
+    scoped_scene s = after(more, rtol);
     const long long steps = drape_sim_statistics(s.sim).steps_accepted;
-    scene_close(&s);
     return steps;
 }
 
 /* rtol stands for two weights and an order, and nothing else: with all three given, it has no effect; and
  * each of them has an effect of its own. */
-START_TEST(atol_x_and_atol_v_are_the_weights)
+TEST(atol_x_and_atol_v_are_the_weights)
 {
     char all[160];
     snprintf(all, sizeof all, ", 'max_order': 2, 'atol_x': %.17g, 'atol_v': %.17g", 1e-4 * LENGTH,
@@ -132,13 +126,12 @@ START_TEST(atol_x_and_atol_v_are_the_weights)
     ck_assert_int_gt(tight_x, 2 * neither);
     ck_assert_int_gt(tight_v, 2 * neither);
 }
-END_TEST
 
 /* Tolerances do not depend on the position of the scene. At 1000 m positions are rounded to 2^-44 = 5.7e-14
  * m, at the origin to 1e-16 m; that noise grows by the divergence of neighbouring runs (test_ida_full.c),
  * here by less than 1e4. Decisions to accept a step compare numbers that differ by as much: they are the
  * same except by accident. */
-START_TEST(a_scene_far_away_takes_the_same_steps)
+TEST(a_scene_far_away_takes_the_same_steps)
 {
     const double far = 1000;
     static const int orders[] = {2, 5};
@@ -146,8 +139,8 @@ START_TEST(a_scene_far_away_takes_the_same_steps)
         char order[40];
         double worst = 0;
         snprintf(order, sizeof order, ", 'max_order': %d", orders[k]);
-        scene here = scene_open(SHEET, 0.0, HUNG, 1e-4, order),
-              there = scene_open(SHEET, far, HUNG, 1e-4, order);
+        scoped_scene here = scene_open(SHEET, 0.0, HUNG, 1e-4, order),
+                     there = scene_open(SHEET, far, HUNG, 1e-4, order);
         scene_watch(&here);
         scene_watch(&there);
         scene_advance(&here, END);
@@ -160,11 +153,8 @@ START_TEST(a_scene_far_away_takes_the_same_steps)
             worst = fmax(worst, fabs(drape_sim_positions(there.sim)[i] - (i % 3 == 0 ? far : 0) -
                                      drape_sim_positions(here.sim)[i]));
         assert_below(worst, 1e4 * 5.7e-14);
-        scene_close(&here);
-        scene_close(&there);
     }
 }
-END_TEST
 
 /* ---- Steps ---- */
 
@@ -193,39 +183,34 @@ static step_log steps_of(scene *s, double end)
     return log;
 }
 
-START_TEST(max_step_is_kept)
+TEST(max_step_is_kept)
 {
     const double limit = 7e-4;
-    scene free_run = sheet(HUNG, 1e-2, ""), s = sheet(HUNG, 1e-2, ", 'max_step': 7e-4");
+    scoped_scene free_run = sheet(HUNG, 1e-2, ""), s = sheet(HUNG, 1e-2, ", 'max_step': 7e-4");
     const step_log log = steps_of(&s, 0.1), free_log = steps_of(&free_run, 0.1);
     ck_assert_double_gt(free_log.h[free_log.count / 2], 2 * limit); /* free steps are longer */
     for (int i = 0; i < log.count; i++) /* a step is the difference of two times of at most 0.1 s */
         ck_assert_double_le(log.h[i], limit + 0.1 * DBL_EPSILON);
     ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
-    scene_close(&free_run);
-    scene_close(&s);
 }
-END_TEST
 
 /* Two thousand steps of 1e-4 s end within their rounding errors of 0.2 s, but not there. */
-START_TEST(an_advance_ends_at_its_end)
+TEST(an_advance_ends_at_its_end)
 {
-    scene s = sheet(HUNG, 1e-2, ", 'max_step': 1e-4");
+    scoped_scene s = sheet(HUNG, 1e-2, ", 'max_step': 1e-4");
     for (double end = 0.2; end < 0.4; end += 0.1) {
         scene_advance(&s, end);
         ck_assert_double_eq(drape_sim_time(s.sim), end);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* A step ends at every key within it, to the last bit, and the next one starts small: IDA has no history
  * there. Its first step is at most a thousandth of the time left, or 1/2 over the norm of the rates; here
  * less than a fifth of the step before. */
-START_TEST(steps_end_at_kinks_and_start_anew)
+TEST(steps_end_at_kinks_and_start_anew)
 {
     static const double kinks[] = {0.05, 0.1, 0.17};
-    scene s = sheet(MOVED, 1e-4, "");
+    scoped_scene s = sheet(MOVED, 1e-4, "");
     step_log log = steps_of(&s, END);
     for (int k = 0; k < 3; k++) {
         int at = 0;
@@ -236,9 +221,7 @@ START_TEST(steps_end_at_kinks_and_start_anew)
                log.h[at - 1], log.h[at]);
         ck_assert_double_lt(log.h[at], 0.2 * fmax(log.h[at - 2], log.h[at - 1]));
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Ends and frames ---- */
 
@@ -261,7 +244,7 @@ static drape_status note_frame(void *user, const drape_event *event)
 /* Frames at 60/s, from dense output or from a run that stops at every frame. */
 static frame_log frames(double rtol, const char *more, bool stop)
 {
-    scene s = sheet(MOVED, rtol, more);
+    scoped_scene s = sheet(MOVED, rtol, more);
     frame_log log = {.size = 3 * (size_t)s.model->node_count};
     log.x = malloc(64 * log.size * sizeof *log.x);
     ck_assert_ptr_nonnull(log.x);
@@ -272,7 +255,6 @@ static frame_log frames(double rtol, const char *more, bool stop)
     }
     scene_advance(&s, END);
     ck_assert_int_eq(log.count, (int)(60 * END + 0.5) + 1);
-    scene_close(&s);
     return log;
 }
 
@@ -292,7 +274,7 @@ static double worst_frame(const frame_log *a, const frame_log *b)
  * converged run. The dense output is the polynomial of the step, whose error is of the size of the local
  * error, atol_x, and is added. So an advance in pieces gives the same result within the tolerance, frame by
  * frame, and ends at the requested time. */
-START_TEST(frames_are_what_a_run_that_stops_there_has)
+TEST(frames_are_what_a_run_that_stops_there_has)
 {
     static const double rtols[] = {1e-3, 1e-4, 1e-6};
     frame_log converged = frames(1e-9, ", 'max_order': 5", true);
@@ -308,17 +290,15 @@ START_TEST(frames_are_what_a_run_that_stops_there_has)
     }
     free(converged.x);
 }
-END_TEST
 
 /* ---- Faults ---- */
 
 static host_sim host_with_ida(double rtol)
 {
     const drape_setting setting = {"rtol", rtol, NULL};
-    drape_sim_def def;
+    drape_sim_def def = sim_def();
     host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-6", true);
     drape_sim_destroy(&s.sim);
-    drape_sim_def_init(&def, sizeof def);
     def.integrator = "ida";
     def.integrator_settings = &setting;
     def.integrator_setting_count = 1;
@@ -339,7 +319,7 @@ static double host_distance(const host_sim *s, const host_copy *from)
  * is that of the initial state, where no smaller step helps. IDA retries with a quarter of the step, or the
  * controller restarts it. The run completes with finite states, and its error is at most twice that of a
  * run with the same tolerance without the fault. */
-START_TEST(one_fault_is_recovered_from)
+TEST(one_fault_is_recovered_from)
 {
     host_sim tight = host_with_ida(1e-9), good = host_with_ida(1e-4);
     ck_assert_int_eq(drape_sim_advance(tight.sim, 0.2), DRAPE_OK);
@@ -363,10 +343,9 @@ START_TEST(one_fault_is_recovered_from)
     host_close(&good);
     host_close(&tight);
 }
-END_TEST
 
 /* A fault that persists ends the run in the state before it, with the reason. */
-START_TEST(a_fault_that_stays_ends_the_run)
+TEST(a_fault_that_stays_ends_the_run)
 {
     for (int kind = HOST_NAN_FORCE; kind <= HOST_INFINITE_FORCE; kind++) {
         host_sim s = host_with_ida(1e-3);
@@ -380,7 +359,6 @@ START_TEST(a_fault_that_stays_ends_the_run)
         host_close(&s);
     }
 }
-END_TEST
 
 /* ---- Work is bounded ---- */
 
@@ -406,13 +384,13 @@ static drape_status note_last(void *user, const drape_event *event)
 
 /* One step too many ends the run with its reason, time, step size and largest error, in the last accepted
  * state. Each further advance may take as many steps again, and they are those of a run without the bound. */
-START_TEST(too_many_steps_end_the_run)
+TEST(too_many_steps_end_the_run)
 {
     char message[100];
     int ends = 0;
     int64_t count = 0;
     last_state last = {0};
-    scene s = sheet(HUNG, 1e-6, ", 'max_steps': 40");
+    scoped_scene s = sheet(HUNG, 1e-6, ", 'max_steps': 40");
     ck_assert_int_eq(drape_sim_observe(s.sim, note_last, &last), DRAPE_OK);
     while (drape_sim_advance(s.sim, END)) {
         ends++;
@@ -436,31 +414,27 @@ START_TEST(too_many_steps_end_the_run)
     ck_assert_int_eq(count, ends);
     ck_assert_double_eq(drape_sim_time(s.sim), END);
     ck_assert_uint_eq(drape_sim_hash(s.sim), hash_after("", 1e-6));
-    scene_close(&s);
 }
-END_TEST
 
 /* The bound is on the steps that IDA chooses: a host may end more advances than that in a second of
  * simulated time, and the next second has a new count. */
-START_TEST(steps_that_a_host_asks_for_are_not_counted)
+TEST(steps_that_a_host_asks_for_are_not_counted)
 {
     scene s = sheet(HUNG, 1e-2, ", 'max_steps': 100");
     for (int k = 1; k <= 300; k++)
         scene_advance(&s, 1e-4 * k);
     ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 300);
     scene_close(&s);
-    scene slow = sheet(HUNG, 1e-1, ", 'max_steps': 250, 'max_step': 0.01");
+    scoped_scene slow = sheet(HUNG, 1e-1, ", 'max_steps': 250, 'max_step': 0.01");
     scene_advance(&slow, 3);
     ck_assert_int_gt(drape_sim_statistics(slow.sim).steps_accepted, 250);
-    scene_close(&slow);
 }
-END_TEST
 
 /* A host that adds up its times may request an advance by a rounding error, also where IDA restarts. IDA
  * would refuse that as too close; here it is not a step. */
-START_TEST(an_advance_by_one_ulp_is_no_failure)
+TEST(an_advance_by_one_ulp_is_no_failure)
 {
-    scene s = sheet(MOVED, 1e-3, "");
+    scoped_scene s = sheet(MOVED, 1e-3, "");
     static const double times[] = {0.02, 0.05, 0.06};
     for (int k = 0; k < 3; k++) {
         scene_advance(&s, times[k]);
@@ -469,9 +443,7 @@ START_TEST(an_advance_by_one_ulp_is_no_failure)
     }
     scene_advance(&s, 0.1);
     ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Predictions and effort ---- */
 
@@ -492,7 +464,7 @@ static bool retreat_and_look(void *user, N_Vector y)
 
 /* A sheet that meets a floor, and a ball that meets the sheet, with a tolerance that allows steps many gaps
  * long. */
-START_TEST(a_prediction_inside_a_collider_is_held_back)
+TEST(a_prediction_inside_a_collider_is_held_back)
 {
     scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': "
@@ -508,10 +480,9 @@ START_TEST(a_prediction_inside_a_collider_is_held_back)
     ck_assert_int_gt(held_back, 0);
     scene_close(&s);
 }
-END_TEST
 
 /* A stiff hung sheet, whose longest steps need several matrices: at 1e-2 it took 1.6 times those of 1e-3. */
-START_TEST(a_looser_tolerance_takes_no_more_matrices)
+TEST(a_looser_tolerance_takes_no_more_matrices)
 {
     long long matrices[2];
     for (int k = 0; k < 2; k++) {
@@ -529,12 +500,3 @@ START_TEST(a_looser_tolerance_takes_no_more_matrices)
     printf("# %lld matrices at 1e-2, %lld at 1e-3\n", matrices[0], matrices[1]);
     ck_assert_int_le(matrices[0], 1.2 * matrices[1]);
 }
-END_TEST
-
-SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
-      atol_x_and_atol_v_are_the_weights, a_scene_far_away_takes_the_same_steps, max_step_is_kept,
-      an_advance_ends_at_its_end, steps_end_at_kinks_and_start_anew,
-      frames_are_what_a_run_that_stops_there_has, one_fault_is_recovered_from,
-      a_fault_that_stays_ends_the_run, too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
-      an_advance_by_one_ulp_is_no_failure, a_prediction_inside_a_collider_is_held_back,
-      a_looser_tolerance_takes_no_more_matrices)

@@ -45,11 +45,10 @@ static void compare_order(const char *linear, const char *terms, double rtol, in
     const drape_setting settings[] = {{"rtol", rtol, NULL},         {"atol_x", 0.7 * rtol, NULL},
                                       {"atol_v", 2 * rtol, NULL},   {"max_order", max_order, NULL},
                                       {"linear_solver", 0, linear}, {"matrix", 0, "exact"}};
-    drape_sim_def def;
+    drape_sim_def def = sim_def();
     ida_full full;
-    scene s = sheet(terms);
+    scoped_scene s = sheet(terms);
     drape_sim_destroy(&s.sim);
-    drape_sim_def_init(&def, sizeof def);
     def.integrator_settings = settings;
     def.integrator_setting_count = 6;
     scene_start(&s, &def);
@@ -76,7 +75,6 @@ static void compare_order(const char *linear, const char *terms, double rtol, in
     assert_below(x, BOUND_X);
     assert_below(v, BOUND_V);
     ida_full_close(&full);
-    scene_close(&s);
 }
 
 static void compare(const char *terms, double rtol, int max_order, double duration)
@@ -85,23 +83,18 @@ static void compare(const char *terms, double rtol, int max_order, double durati
         compare_order(drape_linears_names[i], terms, rtol, max_order, duration);
 }
 
-START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
+TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
 {
     compare("", 1e-3, 2, 0.4);
     compare("", 1e-5, 5, 0.4);
 }
-END_TEST
 
 /* Dashpots in continuous time make K nonsymmetric, which a solver for symmetric matrices has to notice. D
  * is in the reduced matrix, in its right-hand side and in both blocks of the full one. */
-START_TEST(damping_leaves_the_trajectories_equal)
+TEST(damping_leaves_the_trajectories_equal)
 {
     const char *terms =
         "{'type': 'damp.kelvin_voigt', 'beta': 5e-4}, {'type': 'drag.viscous', 'coefficient': 0.3},";
     compare(terms, 1e-4, 2, 0.4);
     compare(terms, 1e-4, 5, 0.4);
 }
-END_TEST
-
-SUITE("ida_full", the_reduced_system_gives_the_trajectory_of_the_full_one,
-      damping_leaves_the_trajectories_equal)

@@ -38,7 +38,7 @@ static void run(units u, const char *method, const char *settings, const char *o
 {
     const double dt = u.time / 64, pressure = u.mass / u.length / (u.time * u.time);
     memset(c, 0, sizeof *c);
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': %d, 'width': %.17g,"
         "'height': %.17g}, 'material': {'young_modulus': %.17g, 'thickness': %.17g, 'areal_density': %.17g},"
         "'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'nodes': [0]}]}%s],"
@@ -50,7 +50,6 @@ static void run(units u, const char *method, const char *settings, const char *o
     scene_advance(&s, STEPS * dt);
     ck_assert_int_eq(c->steps, STEPS);
     memcpy(c->x, drape_sim_positions(s.sim), sizeof c->x);
-    scene_close(&s);
 }
 
 static int count_by_error(const course *c)
@@ -65,7 +64,7 @@ static const char *const methods[] = {"be", "bdf2"};
 
 /* All factors are powers of two, so that all numbers of one run are those of the other times such a power, to
  * the bit, if nothing in the rules has units of its own. */
-START_TEST(solves_end_at_the_same_iteration_in_all_units)
+TEST(solves_end_at_the_same_iteration_in_all_units)
 {
     static course one, other;
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
@@ -78,12 +77,11 @@ START_TEST(solves_end_at_the_same_iteration_in_all_units)
             ck_assert_double_eq(8 * one.x[i], other.x[i]);
     }
 }
-END_TEST
 
 /* A heavy cloth in free fall has far more energy of inertia, and takes two iterations, fewer than the sheet
  * takes; one that hangs takes more in some steps. The positions may differ by rounding, as the factorisation
  * has another order. */
-START_TEST(a_stranger_changes_no_end)
+TEST(a_stranger_changes_no_end)
 {
     static const char *const strangers[] = {"'thickness': 1e-3, 'areal_density': 1000}, 'terms': "
                                             "['stretch.cst'], 'velocity': [300, 0, 0]}",
@@ -112,13 +110,12 @@ START_TEST(a_stranger_changes_no_end)
         ck_assert_int_gt(later, 0);
     }
 }
-END_TEST
 
 /* One step of backward Euler from each state of a run, to its local error and to a tight tolerance: where the
  * energy is convex along the difference x, |x| <= theta |e| in the norm of the masses, with theta = .33 and
  * e = (d - h v0)/2. The masses of the inner nodes are equal, and those at the edge half of them and less: the
  * Euclidean norms of x and e differ from those by at most a factor of 1 to 6 in m, sqrt(6). */
-START_TEST(what_is_left_is_a_share_of_the_local_error)
+TEST(what_is_left_is_a_share_of_the_local_error)
 {
     static const char scene_text[] =
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1, 'height': "
@@ -126,7 +123,7 @@ START_TEST(what_is_left_is_a_share_of_the_local_error)
         "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.25},"
         "'terms': ['stretch.cst', 'bend.hinge'], 'pins': [{'nodes': [0]}]}],"
         "'integrator': {'method': 'be', 'dt': 0.015625%s}, 'duration': 1}";
-    scene a = scene_open(scene_text, ""), b = scene_open(scene_text, ", 'tolerance': 1e-10");
+    scoped_scene a = scene_open(scene_text, ""), b = scene_open(scene_text, ", 'tolerance': 1e-10");
     double worst = 0, worst_estimate = INFINITY;
     for (int k = 0; k < STEPS; k++) {
         const drape_state *from = scene_state(&a);
@@ -151,18 +148,15 @@ START_TEST(what_is_left_is_a_share_of_the_local_error)
     ck_assert(worst <= 0.33 * sqrt(6));
     ck_assert(worst > 1e-9); /* the rule has ended solves */
     ck_assert(worst_estimate >= 1);
-    scene_close(&a);
-    scene_close(&b);
 }
-END_TEST
 
 /* A tolerance that a scene gives is kept to, and near rest the residual ends all solves without one. */
-START_TEST(a_tolerance_or_rest_is_solved_to_the_residual)
+TEST(a_tolerance_or_rest_is_solved_to_the_residual)
 {
     static course c;
     run(metres, "be", ", 'tolerance': 1e-5", "", &c);
     ck_assert_int_eq(count_by_error(&c), 0);
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 1,"
                    "'height': 1, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e4,"
                    "'thickness': 1e-3, 'areal_density': 0.25}, 'terms': ['stretch.cst', 'bend.hinge',"
@@ -172,15 +166,13 @@ START_TEST(a_tolerance_or_rest_is_solved_to_the_residual)
     scene_watch(&s);
     scene_advance(&s, 10);
     ck_assert(s.accepted >= 20 && s.residual <= drape_sim_statistics(s.sim).tolerance);
-    scene_close(&s);
 }
-END_TEST
 
 /* A stiff sheet of which two corners go to and fro by a seventh of its size in a step; the ball is far away,
  * but in scenes with contact no guess takes the pull of pins to all nodes. Of half of the change of its
  * motion, a seventh of its size where pins turn back, theta may be left in each step, 5 % of the size, and in
  * seven steps it was 25 %. Beside the pins the motion changes by about half of that. */
-START_TEST(cloth_that_pins_take_along_is_solved)
+TEST(cloth_that_pins_take_along_is_solved)
 {
     static const char scene_text[] =
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 20, 'rows': 20, 'width': 0.054, "
@@ -192,8 +184,8 @@ START_TEST(cloth_that_pins_take_along_is_solved)
         "'colliders': [{'type': 'sphere', 'center': [100, 0, 0], 'radius': 1}],"
         "'integrator': {'method': '%s'%s}, 'duration': 0.12}";
     for (size_t m = 0; m < sizeof methods / sizeof *methods; m++) {
-        scene a = scene_open(scene_text, methods[m], ""),
-              b = scene_open(scene_text, methods[m], ", 'tolerance': 1e-8");
+        scoped_scene a = scene_open(scene_text, methods[m], ""),
+                     b = scene_open(scene_text, methods[m], ", 'tolerance': 1e-8");
         double worst = 0;
         for (int k = 1; k <= 7; k++) {
             double squares = 0;
@@ -205,12 +197,5 @@ START_TEST(cloth_that_pins_take_along_is_solved)
         }
         printf("# %s: %.3g of the size from the solved run\n", methods[m], worst);
         assert_below(worst, 0.15);
-        scene_close(&a);
-        scene_close(&b);
     }
 }
-END_TEST
-
-SUITE("local_error", solves_end_at_the_same_iteration_in_all_units, a_stranger_changes_no_end,
-      what_is_left_is_a_share_of_the_local_error, a_tolerance_or_rest_is_solved_to_the_residual,
-      cloth_that_pins_take_along_is_solved)

@@ -110,7 +110,7 @@ static double violation_within(const original *o, const drape_rosenbrock_scheme 
 }
 
 /* The published coefficients have 16 digits, of size up to 34. */
-START_TEST(rodas_has_its_orders_and_is_l_stable)
+TEST(rodas_has_its_orders_and_is_l_stable)
 {
     const drape_rosenbrock_scheme *s = &drape_rosenbrock_rodas;
     const original o = original_of(s);
@@ -134,7 +134,6 @@ START_TEST(rodas_has_its_orders_and_is_l_stable)
         assert_below(growth(&o, y), 1 + 1e-13);
     assert_below(growth(&o, 1e9), 1e-6);
 }
-END_TEST
 
 /* ---- Orders ---- */
 
@@ -153,25 +152,23 @@ END_TEST
 
 static double *advance(const char *pins, const char *method, const drape_setting *settings, size_t count)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.integrator_settings = settings;
     def.integrator_setting_count = count;
-    scene s = scene_model(SHEET, pins);
+    scoped_scene s = scene_model(SHEET, pins);
     scene_start(&s, &def);
     scene_advance(&s, END);
     const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
     double *x = malloc(size);
     ck_assert_ptr_nonnull(x);
     memcpy(x, drape_sim_positions(s.sim), size);
-    scene_close(&s);
     return x;
 }
 
 /* Steps of 4 to 1 ms. At the last pair the slope of an error C h^p (1 + c h) is off by c h/1.4, which is 0.19
  * if c is the fastest rate, 260/s (test_order.c). The reference, ida at rtol 1e-12, is off by 1e-11 m. */
-START_TEST(rosenbrock_has_its_order)
+TEST(rosenbrock_has_its_order)
 {
     static const char *const pins[] = {HUNG, MOVED};
     for (size_t k = 0; k < 2; k++) {
@@ -191,7 +188,6 @@ START_TEST(rosenbrock_has_its_order)
         assert_below(fabs(slope - drape_rosenbrock_rodas.order), 0.2);
     }
 }
-END_TEST
 
 /* ---- The error control ---- */
 
@@ -227,6 +223,8 @@ static void close_control(control *k)
     scene_close(&k->s);
 }
 
+#define scoped_control SCOPED(close_control) control
+
 /* An attempt with this error; if it passes, the state moves on. */
 static drape_status try_with(control *k, double end, double bound, double error, drape_local_attempt *a,
                              drape_step_info *info)
@@ -248,9 +246,9 @@ static drape_status try_with(control *k, double end, double bound, double error,
     return status;
 }
 
-START_TEST(the_norm_is_the_weighted_root_mean_square)
+TEST(the_norm_is_the_weighted_root_mean_square)
 {
-    control k = open_control(HUNG);
+    scoped_control k = open_control(HUNG);
     int32_t worst;
     const double length = 0.5;
     assert_below(fabs(k.c.atol_x / (1e-3 * length) - 1), 1e-14);
@@ -262,14 +260,12 @@ START_TEST(the_norm_is_the_weighted_root_mean_square)
     k.ev[0] = NAN;
     ck_assert(isnan(drape_local_error_norm(&k.c, k.ex, k.ev, &worst)));
     ck_assert_int_eq(worst, k.s.model->node_of_free[0]);
-    close_control(&k);
 }
-END_TEST
 
 /* Growth at most by 5, cuts at most to a fifth; a failed test; no growth after it; the predictive formula. */
-START_TEST(sizes_follow_the_errors)
+TEST(sizes_follow_the_errors)
 {
-    control k = open_control(HUNG);
+    scoped_control k = open_control(HUNG);
     drape_local_attempt a;
     drape_step_info info;
     const double end = 1e6;
@@ -296,17 +292,15 @@ START_TEST(sizes_follow_the_errors)
     assert_below(fabs(info.retry / (0.2 * a.h) - 1), 1e-14);
     ck_assert_int_eq(try_with(&k, end, end, NAN, &a, &info), DRAPE_RETRY_NONFINITE);
     ck_assert(info.retry == 0);
-    close_control(&k);
 }
-END_TEST
 
 /* Ends of advances, kinks of pins at 0.03, 0.1, 0.15 s. No step is shorter than half of what was proposed,
  * except where an advance itself is. */
-START_TEST(steps_end_at_kinks_and_at_the_end_without_slivers)
+TEST(steps_end_at_kinks_and_at_the_end_without_slivers)
 {
     const double kinks[] = {0.03, 0.1, 0.15};
     for (int m = 1; m < 40; m++) {
-        control k = open_control(MOVED);
+        scoped_control k = open_control(MOVED);
         drape_local_attempt a;
         drape_step_info info;
         const double step = 1.7e-4 * m * m / 10;
@@ -325,15 +319,13 @@ START_TEST(steps_end_at_kinks_and_at_the_end_without_slivers)
         }
         ck_assert(k.in.t == END);
         ck_assert_int_eq(met, 3);
-        close_control(&k);
     }
 }
-END_TEST
 
 /* A cut that the end of an advance makes is forgotten in the next one. */
-START_TEST(a_cut_step_keeps_the_proposal)
+TEST(a_cut_step_keeps_the_proposal)
 {
-    control k = open_control(HUNG);
+    scoped_control k = open_control(HUNG);
     drape_local_attempt a;
     drape_step_info info;
     for (int i = 0; i < 8; i++)
@@ -343,14 +335,12 @@ START_TEST(a_cut_step_keeps_the_proposal)
     assert_below(fabs(a.h / (steady / 1000) - 1), 1e-9);
     ck_assert_int_eq(try_with(&k, 1e6, 1e6, 0.4, &a, &info), DRAPE_OK);
     ck_assert_double_gt(a.h, 0.5 * steady);
-    close_control(&k);
 }
-END_TEST
 
 /* 1000 steps a second at most, in this control; steps that move nothing. */
-START_TEST(the_work_is_bounded)
+TEST(the_work_is_bounded)
 {
-    control k = open_control(HUNG);
+    scoped_control k = open_control(HUNG);
     drape_local_attempt a;
     drape_step_info info;
     drape_status status = DRAPE_OK;
@@ -368,10 +358,4 @@ START_TEST(the_work_is_bounded)
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
     ck_assert_int_eq(info.reason, DRAPE_REASON_ERROR_TEST);
     ck_assert_int_le(steps, 22);
-    close_control(&k);
 }
-END_TEST
-
-SUITE("one_step", rodas_has_its_orders_and_is_l_stable, rosenbrock_has_its_order,
-      the_norm_is_the_weighted_root_mean_square, sizes_follow_the_errors,
-      steps_end_at_kinks_and_at_the_end_without_slivers, a_cut_step_keeps_the_proposal, the_work_is_bounded)

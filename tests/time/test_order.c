@@ -48,18 +48,16 @@ static double distance(const scene *s, const double *reference)
 static double *solution(const char *method, double rtol, const char *terms, const char *pins)
 {
     const drape_setting setting = {"rtol", rtol, NULL};
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.integrator_settings = &setting;
     def.integrator_setting_count = 1;
-    scene s = sheet(terms, pins, &def);
+    scoped_scene s = sheet(terms, pins, &def);
     const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
     double *x = malloc(size);
     ck_assert_ptr_nonnull(x);
     scene_advance(&s, END);
     memcpy(x, drape_sim_positions(s.sim), size);
-    scene_close(&s);
     return x;
 }
 
@@ -88,18 +86,16 @@ static double uneven_steps(int k, int n)
 static double error_of(const char *method, const char *terms, const char *pins, const double *reference,
                        int n, step_end *end)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.controller = "fixed";
     def.dt = 1;
-    scene s = sheet(terms, pins, &def);
+    scoped_scene s = sheet(terms, pins, &def);
     scene_watch(&s);
     for (int k = 1; k <= n; k++)
         scene_advance(&s, end(k, n));
     ck_assert_int_eq(s.accepted, n);
     const double error = distance(&s, reference);
-    scene_close(&s);
     return error;
 }
 
@@ -128,14 +124,13 @@ static bool has_fixed_steps(const drape_integrator_ops *method)
     return !method->own_steps && !method->steady_state;
 }
 
-START_TEST(every_integrator_converges_with_the_order_it_declares)
+TEST(every_integrator_converges_with_the_order_it_declares)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
             check_slope(drape_integrators[i]->entry.name, DASHPOTS, HUNG, equal_steps,
                         drape_integrators[i]->order);
 }
-END_TEST
 
 /* Error of dirk at the end of n steps of equal size. Its Newton iterations leave 0.1 x 1e-12 of the size of
  * the scene in each stage. */
@@ -143,26 +138,24 @@ static double error_of_dirk(int order, const double *reference, int n)
 {
     const drape_setting settings[] = {
         {"order", order, NULL}, {"fixed_step", END / n, NULL}, {"rtol", 1e-12, NULL}};
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = "dirk";
     def.integrator_settings = settings;
     def.integrator_setting_count = 3;
-    scene s = sheet(DASHPOTS, HUNG, &def);
+    scoped_scene s = sheet(DASHPOTS, HUNG, &def);
     scene_watch(&s);
     scene_advance(&s, END);
     ck_assert_int_eq(s.accepted, n);
     const double error = distance(&s, reference);
-    scene_close(&s);
     return error;
 }
 
 /* Steps of 4 to 1 ms, at order 3 down to 0.5 ms. The reference is radau's, of another family, at rtol 1e-12.
  * The smallest error, 7e-12 m of order 5, is 10 times that at which halving the steps again no longer lowers
  * it. */
-START_TEST(dirk_converges_with_each_of_its_orders)
+TEST(dirk_converges_with_each_of_its_orders)
 {
-    double *reference = solution("radau", 1e-12, DASHPOTS, HUNG);
+    scoped_memory double *reference = solution("radau", 1e-12, DASHPOTS, HUNG);
     for (int order = 2; order <= 5; order++) {
         double before = NAN, slope = NAN;
         for (int n = 50; n <= (order == 3 ? 400 : 200); n *= 2) {
@@ -173,19 +166,16 @@ START_TEST(dirk_converges_with_each_of_its_orders)
         }
         ck_assert_msg(fabs(slope - order) <= 0.1, "dirk of order %d: slope %g", order, slope);
     }
-    free(reference);
 }
-END_TEST
 
 /* bdf2 uses the size of the step before; one-step methods use no history. */
-START_TEST(steps_of_changing_size_keep_the_order)
+TEST(steps_of_changing_size_keep_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
             check_slope(drape_integrators[i]->entry.name, DASHPOTS, HUNG, uneven_steps,
                         drape_integrators[i]->order);
 }
-END_TEST
 
 /* At a kink of a track the velocity of the pin jumps. Then the force of springs has a kink in time, and
  * that of dashpots jumps. One-step methods have no history, and with kinks at the ends of steps every step
@@ -194,14 +184,13 @@ END_TEST
  * the dashpot that would be f + j, and v1 off by h j/3: order 1. But the rate is the same formula of q: 3/2
  * of the new slope less 1/2 of the old, so f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and
  * the order is kept. */
-START_TEST(kinks_at_ends_of_steps_leave_the_order)
+TEST(kinks_at_ends_of_steps_leave_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
             check_slope(drape_integrators[i]->entry.name, DASHPOTS, MOVED, equal_steps,
                         drape_integrators[i]->order);
 }
-END_TEST
 
 /* ---- The error controller ---- */
 
@@ -212,8 +201,7 @@ typedef struct step_log {
 
 static drape_sim_def controlled(const char *method, const drape_setting *settings, size_t count)
 {
-    drape_sim_def def;
-    drape_sim_def_init(&def, sizeof def);
+    drape_sim_def def = sim_def();
     def.integrator = method;
     def.controller = "error";
     def.controller_settings = settings;
@@ -227,9 +215,9 @@ static drape_sim_def controlled(const char *method, const drape_setting *setting
  * the exponent is left for the start, where the first steps differ in size from later ones. An integrator
  * with a stability limit takes substeps if the error would allow a larger step, and then its errors are far
  * below: it is checked only over the last decade, where a step is a single substep. */
-START_TEST(error_falls_with_the_controllers_rtol)
+TEST(error_falls_with_the_controllers_rtol)
 {
-    double *reference = converged(DASHPOTS, HUNG);
+    scoped_memory double *reference = converged(DASHPOTS, HUNG);
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *method = drape_integrators[i];
         double first = 0, before = INFINITY;
@@ -237,7 +225,7 @@ START_TEST(error_falls_with_the_controllers_rtol)
         for (int k = 2; has_fixed_steps(method) && k <= 5; k++) {
             const drape_setting rtol = {"rtol", pow(10, -k), NULL};
             const drape_sim_def def = controlled(method->entry.name, &rtol, 1);
-            scene s = sheet(DASHPOTS, HUNG, &def);
+            scoped_scene s = sheet(DASHPOTS, HUNG, &def);
             scene_advance(&s, END);
             const double error = distance(&s, reference);
             printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", method->entry.name, k,
@@ -247,14 +235,11 @@ START_TEST(error_falls_with_the_controllers_rtol)
                           k, error, before);
             first = k == from ? error : first;
             before = error;
-            scene_close(&s);
         }
         if (has_fixed_steps(method))
             assert_below(before, first * pow(10, -0.75 * (5 - from) * method->order / (method->order + 1)));
     }
-    free(reference);
 }
-END_TEST
 
 /* A scene with one free node, for the estimate. */
 static scene node(void)
@@ -310,12 +295,12 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
  * error y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in the middle: the estimate
  * equals that up to some w h. The terms of third order are 1/2 h^3 y''' from the second difference and 1/3
  * h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for both: less than 2.5 w h in all. */
-START_TEST(the_estimate_for_backward_euler_is_its_local_error)
+TEST(the_estimate_for_backward_euler_is_its_local_error)
 {
     static const double phases[] = {0.1, 0.03, 0.01, 0.001}; /* w h */
     const double w = 50;                                     /* [1/s] */
     double values[DRAPE_MAX_PARAMS], y[3][2];
-    scene s = node();
+    scoped_scene s = node();
     ck_assert_int_eq(s.model->free_count, 1);
     for (int k = 0; k < 4; k++) {
         const double z = phases[k], h = z / w;
@@ -335,10 +320,4 @@ START_TEST(the_estimate_for_backward_euler_is_its_local_error)
             ck_assert_double_le(fabs(guess / truth - 1), 2.5 * z);
         }
     }
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("order", every_integrator_converges_with_the_order_it_declares, dirk_converges_with_each_of_its_orders,
-      steps_of_changing_size_keep_the_order, kinks_at_ends_of_steps_leave_the_order,
-      error_falls_with_the_controllers_rtol, the_estimate_for_backward_euler_is_its_local_error)

@@ -40,7 +40,7 @@ static drape_status note_frame(void *user, const drape_event *event)
 /* To END in n advances. */
 static run run_sheet(const char *terms, const char *method, const char *settings, int n)
 {
-    scene s = scene_open(SHEET, terms, method, settings);
+    scoped_scene s = scene_open(SHEET, terms, method, settings);
     run r = {.size = 3 * (size_t)s.model->node_count};
     r.x = calloc(110 * r.size, sizeof(double));
     ck_assert_ptr_nonnull(r.x);
@@ -50,7 +50,6 @@ static run run_sheet(const char *terms, const char *method, const char *settings
     memcpy(r.x, drape_sim_positions(s.sim), r.size * sizeof(double));
     r.numerical = drape_sim_energy(s.sim).numerical;
     r.accepted = (long)drape_sim_statistics(s.sim).steps_accepted;
-    scene_close(&s);
     return r;
 }
 
@@ -79,7 +78,7 @@ static double worst_frame(const run *a, const run *b)
  * the energy account consists of the method's errors and those of the quadrature of powers, of order 5, too.
  * The reference has an error of 3e-13 m, a hundredth of the smallest one here, which changes a slope by 0.02.
  */
-START_TEST(order_5)
+TEST(order_5)
 {
     static const char *const terms[] = {"", DASHPOTS};
     for (int damped = 0; damped < 2; damped++) {
@@ -102,12 +101,11 @@ START_TEST(order_5)
         free(reference.x);
     }
 }
-END_TEST
 
 /* Frames between steps come from the integral of the velocities' cubic: its error within a step of size h is
  * O(h^5), as that of the steps: at h = 5 ms and 2.5 ms the slope is within 0.5 of 5, since which fractions
  * of the steps the frames are at changes with h. */
-START_TEST(frames_have_the_order_of_the_steps)
+TEST(frames_have_the_order_of_the_steps)
 {
     run reference = run_sheet("", "radau", "'rtol': 1e-12", 1);
     run coarse = run_sheet("", "radau", FORCED, 40), fine = run_sheet("", "radau", FORCED, 80);
@@ -119,16 +117,15 @@ START_TEST(frames_have_the_order_of_the_steps)
     free(coarse.x);
     free(fine.x);
 }
-END_TEST
 
 /* A step of 1 ns, which ends an advance, is followed by steps as long as without it: neither its polynomial
  * nor its error says anything about those. One more step and one more failure may follow from where steps
  * end. */
-START_TEST(a_tiny_step_leaves_no_trace)
+TEST(a_tiny_step_leaves_no_trace)
 {
     long accepted[2], rejected[2];
     for (int k = 0; k < 2; k++) {
-        scene s = scene_open(SHEET, "", "radau", "'rtol': 1e-5");
+        scoped_scene s = scene_open(SHEET, "", "radau", "'rtol': 1e-5");
         scene_watch(&s);
         scene_advance(&s, 0.07);
         if (k == 1)
@@ -136,14 +133,12 @@ START_TEST(a_tiny_step_leaves_no_trace)
         scene_advance(&s, END);
         accepted[k] = s.accepted;
         rejected[k] = s.rejected;
-        scene_close(&s);
     }
     printf("# %ld steps, %ld rejected; with one of 1 ns %ld, %ld\n", accepted[0], rejected[0], accepted[1],
            rejected[1]);
     ck_assert_int_le(accepted[1], accepted[0] + 2);
     ck_assert_int_le(rejected[1], rejected[0] + 1);
 }
-END_TEST
 
 /* ---- Stability function ---- */
 
@@ -198,7 +193,7 @@ static drape_status follow(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-START_TEST(oscillator_follows_the_stability_function)
+TEST(oscillator_follows_the_stability_function)
 {
     enum { CENTRE = 4, STEPS = 5 };
     const double length = 0.1, w = sqrt(3 * sqrt(3.0) / 2 * 1e3 / (0.2 * sqrt(3.0) / 2 * length * length));
@@ -208,7 +203,7 @@ START_TEST(oscillator_follows_the_stability_function)
         char term[96] = "";
         if (beta > 0)
             snprintf(term, sizeof term, "{'type': 'damp.kelvin_voigt', 'beta': %.17g},", beta);
-        scene s = scene_open(
+        scoped_scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': "
             "%g, 'transform': {'translate': [%.17g, 0, %.17g]}},"
             "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2},"
@@ -234,10 +229,8 @@ START_TEST(oscillator_follows_the_stability_function)
          * Dashpots and short steps multiply the last two by up to 1 + beta/h. */
         const double bound = 1e-10 + 4 * DBL_EPSILON / 1e-5 + 1e-11 * 0.1 * 2.2e-3 * 0.3 / amplitude;
         assert_below(worst, o.steps * (1 + 2 * beta / h) * bound);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Matrices ---- */
 
@@ -272,7 +265,7 @@ static double norm(int64_t n, const double *a)
 /* The solution has the residual that was asked for, measured behind P^-1, and rounding. Without damping, and
  * with K positive definite, as at rest, the residual falls by .46 in each iteration at least, at any
  * stiffness, mesh and step (radau_matrix.h), and with damping it takes not many more. */
-START_TEST(complex_systems_are_solved_at_a_rate_that_no_mesh_changes)
+TEST(complex_systems_are_solved_at_a_rate_that_no_mesh_changes)
 {
     static const double steps[] = {1e-4, 1e-2, 1};
     const double tolerance = 1e-7;
@@ -280,7 +273,7 @@ START_TEST(complex_systems_are_solved_at_a_rate_that_no_mesh_changes)
         const int side = k % 2 ? 12 : 6;
         const bool damped = k / 2 % 2;
         const double h = steps[k / 4];
-        scene s =
+        scoped_scene s =
             scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': %d, 'rows': %d, "
                        "'width': 1, 'height': 1}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, "
                        "'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge' %s],"
@@ -322,10 +315,5 @@ START_TEST(complex_systems_are_solved_at_a_rate_that_no_mesh_changes)
         free(b);
         drape_radau_matrix_destroy(&m);
         drape_arena_free(&arena);
-        scene_close(&s);
     }
 }
-END_TEST
-
-SUITE("radau", order_5, frames_have_the_order_of_the_steps, a_tiny_step_leaves_no_trace,
-      oscillator_follows_the_stability_function, complex_systems_are_solved_at_a_rate_that_no_mesh_changes)

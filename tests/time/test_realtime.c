@@ -31,8 +31,7 @@ static double distance(const scene *a, const scene *b)
 static drape_realtime advance(scene *s, double frame, double budget)
 {
     drape_realtime report;
-    drape_status status = drape_sim_advance_realtime(s->sim, frame, budget, &report);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_advance_realtime(s->sim, frame, budget, &report));
     return report;
 }
 
@@ -44,13 +43,13 @@ static drape_realtime advance(scene *s, double frame, double budget)
  * one step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
  * gradients to a tenth; 2 % of the fall is a bound with room, the goal of the bench. Two are better by more
  * than half. */
-START_TEST(few_iterations_are_near_the_converged_step)
+TEST(few_iterations_are_near_the_converged_step)
 {
-    scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-7");
+    scoped_scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-7");
     scene_advance(&exact, 0.5);
     double errors[2];
     for (int k = 1; k <= 2; k++) {
-        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? NO_MORE : NO_MORE ", 'iterations': 2");
+        scoped_scene s = scene_open(HUNG, "", "newton_k", k == 1 ? NO_MORE : NO_MORE ", 'iterations': 2");
         scene_watch(&s);
         scene_advance(&s, 0.5);
         errors[k - 1] = distance(&exact, &s);
@@ -59,34 +58,28 @@ START_TEST(few_iterations_are_near_the_converged_step)
         ck_assert_int_ge(work.newton_iterations, 30 * k);
         ck_assert_int_le(work.newton_iterations, 30 * k + 1);
         ck_assert_int_gt(work.linear_iterations, work.newton_iterations);
-        scene_close(&s);
     }
     ck_assert_msg(errors[0] < 0.02 && errors[1] < 0.5 * errors[0], "%g m, %g m", errors[0], errors[1]);
-    scene_close(&exact);
 }
-END_TEST
 
 /* With enough iterations and digits the step is backward Euler: both solve the same equations up to their
  * residuals, and a residual of 1e-9 N moves a node by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
-START_TEST(with_many_iterations_the_step_is_backward_euler)
+TEST(with_many_iterations_the_step_is_backward_euler)
 {
-    scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
-    scene s = scene_open(HUNG, "", "newton_k", ", 'iterations': 40, 'tolerance': 1e-9");
+    scoped_scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
+    scoped_scene s = scene_open(HUNG, "", "newton_k", ", 'iterations': 40, 'tolerance': 1e-9");
     scene_watch(&s);
     scene_advance(&exact, 0.2);
     scene_advance(&s, 0.2);
     ck_assert_double_lt(s.residual, 1e-9);
     ck_assert_double_lt(distance(&exact, &s), 1e-7);
-    scene_close(&exact);
-    scene_close(&s);
 }
-END_TEST
 
 /* The fixed-iteration step includes contact, friction, damping and drag: a damped sheet with drag falls
  * onto a sphere and stays on it. */
-START_TEST(the_step_includes_contact_and_damping)
+TEST(the_step_includes_contact_and_damping)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 13, 'rows': 13, 'width': 0.6, "
         "'height': 0.6,"
         " 'orientation': 'horizontal'}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
@@ -108,16 +101,14 @@ START_TEST(the_step_includes_contact_and_damping)
     ck_assert_double_gt(lowest, -1);
     ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 0.2);
     ck_assert_double_gt(drape_sim_energy(s.sim).dissipated, 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* A cloth in free fall beside one that lands on a ball: contact of the one must not hold back the other,
  * which falls by g h^2 n (n + 1)/2 in n steps of backward Euler. The solver leaves at most 1e-6 of a residual
  * that the forces of the impact dominate, at most 1e3 times the weight: 1e-3 of g h in the velocity of each
  * step, and 30^2/2 x 1e-3 g h^2 = 1.2 mm. If all of a correction were shortened alike, it would stay behind
  * by .16 m. */
-START_TEST(contact_holds_back_only_what_it_touches)
+TEST(contact_holds_back_only_what_it_touches)
 {
     static const char *const cloth =
         "{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.4, 'height': 0.4, 'orientation': "
@@ -127,7 +118,7 @@ START_TEST(contact_holds_back_only_what_it_touches)
     char lands[512], falls[512];
     snprintf(lands, sizeof lands, cloth, 0., 0.1);
     snprintf(falls, sizeof falls, cloth, 2., 5.);
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [%s, %s], 'colliders': [{'type': 'sphere', 'center': [0.2, -0.2, "
                    "-0.2], 'radius': 0.2}], 'contact': {'distance': 0.004}, 'integrator': {'method': "
                    "'newton_k'}, 'duration': 0.5}",
@@ -136,18 +127,16 @@ START_TEST(contact_holds_back_only_what_it_touches)
     const double *x = drape_sim_positions(s.sim), h = 1 / 60.;
     for (int32_t i = s.model->node_count / 2; i < s.model->node_count; i++)
         ck_assert_double_eq_tol(x[3 * i + 1], 5 - 9.81 * h * h * 30 * 31 / 2, 2e-3);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Budgets ---- */
 
 /* A budget too small for any step: steps grow to the longest, with at most one a call; the debt stays below
  * that, and the rest is dropped. Then there is time again: within a few frames the level is full and the
  * debt 0. */
-START_TEST(the_level_degrades_and_recovers)
+TEST(the_level_degrades_and_recovers)
 {
-    scene s = scene_open(HUNG, "", "newton_k", "");
+    scoped_scene s = scene_open(HUNG, "", "newton_k", "");
     const double frame = 1.0 / 60, longest = 4 * frame;
     double first = drape_sim_time(s.sim), dropped = 0;
     drape_realtime r = advance(&s, frame, PLENTY);
@@ -169,15 +158,13 @@ START_TEST(the_level_degrades_and_recovers)
     ck_assert(strcmp(r.level, "full") == 0 && r.effort == 0 && r.debt == 0 && r.kept);
     ck_assert_double_le(r.h, frame * (1 + 1e-9));
     ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 1);
-    scene_close(&s);
 }
-END_TEST
 
 /* A frame of 0.3 s is one that no step covers: of what is left, all but the longest step, 4/60 s, is dropped.
  * After one such frame in 0.1 s that is more than a tenth, after 3 s with none it is less. */
-START_TEST(dropped_time_has_a_warning)
+TEST(dropped_time_has_a_warning)
 {
-    scene s = scene_open(HUNG, "", "newton_k", "");
+    scoped_scene s = scene_open(HUNG, "", "newton_k", "");
     for (int k = 0; k < 2; k++) {
         drape_warning w;
         bool warned = false;
@@ -189,33 +176,28 @@ START_TEST(dropped_time_has_a_warning)
             warned |= strcmp(w.name, "time_dropped") == 0;
         ck_assert_msg(warned == (k == 0), "%d", k);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* A single frame that is owed does not delay the next ones: one slow step in a hundred. */
-START_TEST(a_single_late_frame_is_made_up_for)
+TEST(a_single_late_frame_is_made_up_for)
 {
-    scene s = scene_open(HUNG, "", "newton_k", "");
+    scoped_scene s = scene_open(HUNG, "", "newton_k", "");
     for (int k = 0; k < 30; k++) {
         drape_realtime r = advance(&s, 1.0 / 60, k == 10 ? NOTHING : PLENTY);
         if (k > 12)
             ck_assert(r.debt == 0 && r.kept);
     }
     ck_assert_double_eq_tol(drape_sim_time(s.sim), 0.5, 1e-9);
-    scene_close(&s);
 }
-END_TEST
 
 /* Integrators that choose their own steps, and integrators without efforts, also complete the frame; a
  * plain advance continues with the scene's own steps. */
-START_TEST(every_integrator_with_a_time_takes_frames)
+TEST(every_integrator_with_a_time_takes_frames)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         drape_realtime r;
-        scene s = scene_model(HUNG, "", "be", ", 'tolerance': 1e-4");
-        drape_sim_def def;
-        drape_sim_def_init(&def, sizeof def);
+        scoped_scene s = scene_model(HUNG, "", "be", ", 'tolerance': 1e-4");
+        drape_sim_def def = sim_def();
         def.integrator = drape_integrators[i]->entry.name;
         scene_start(&s, &def);
         drape_status status = drape_sim_advance_realtime(s.sim, 0.02, PLENTY, &r);
@@ -230,10 +212,8 @@ START_TEST(every_integrator_with_a_time_takes_frames)
             ck_assert_int_eq(drape_sim_advance(s.sim, 0.1), DRAPE_OK);
             ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
         }
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* ---- Contact ---- */
 
@@ -265,9 +245,9 @@ static double strike(scene *s, int frames, double budget)
 /* The ball moves by 33 mm a step, 32 times the thickness of the cloth. The distance, between half of that and
  * all of it, is 2^5 thicknesses. When the ball rests, the sheet swings past it at less than 0.5 m/s in the
  * mean, 8 mm a step, and the distance falls to at most twice that. */
-START_TEST(a_fast_body_is_served_by_the_default_distance)
+TEST(a_fast_body_is_served_by_the_default_distance)
 {
-    scene s = scene_open(STRUCK, "", "newton_k");
+    scoped_scene s = scene_open(STRUCK, "", "newton_k");
     s.rejected = 0;
     const double distance = strike(&s, 24, PLENTY), path = 2.0 / 60;
     ck_assert_double_ge(distance, 0.5 * path);
@@ -277,16 +257,14 @@ START_TEST(a_fast_body_is_served_by_the_default_distance)
     for (int k = 0; k < 30; k++)
         advance(&s, 1.0 / 60, PLENTY);
     ck_assert_double_le(drape_system_contact(s.sim->system)->broad.distance[0], 2 * 0.5 / 60);
-    scene_close(&s);
 }
-END_TEST
 
 /* A sheet falls on a ball, with time for one iteration a step. The energy that the residuals put in is taken
  * back as far as it is motion, and never counted as dissipated: neither what the cloth gains nor what is
  * dissipated beyond what it has lost is more than its fall of 0.2 m to the ball gave it. */
-START_TEST(starved_steps_make_no_energy)
+TEST(starved_steps_make_no_energy)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 17, 'rows': 17, 'width': 1, "
         "'height': 1, 'orientation': 'horizontal', 'transform': {'translate': [-0.5, 0.2, "
         "0.5]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2}, "
@@ -304,22 +282,18 @@ START_TEST(starved_steps_make_no_energy)
         assert_below(e.dissipated, e.numerical + e.dissipated + given);
     }
     assert_below(gained, given);
-    scene_close(&s);
 }
-END_TEST
 
 /* A ball that is far from the sheet when it begins to move has the whole distance after one step. */
-START_TEST(the_distance_is_there_before_the_body)
+TEST(the_distance_is_there_before_the_body)
 {
-    scene s = scene_open(STRUCK, "", "newton_k");
+    scoped_scene s = scene_open(STRUCK, "", "newton_k");
     ck_assert_double_ge(strike(&s, 1, PLENTY), 0.5 * 2.0 / 60);
-    scene_close(&s);
 }
-END_TEST
 
 /* Where the scene gives a distance, it stays; where the ball moves by more than five of it in a step, there
  * is a warning. */
-START_TEST(a_distance_that_is_given_is_kept)
+TEST(a_distance_that_is_given_is_kept)
 {
     static const double given[] = {0.001, 0.03};
     for (int i = 0; i < 2; i++) {
@@ -327,21 +301,19 @@ START_TEST(a_distance_that_is_given_is_kept)
         drape_warning warning;
         bool warned = false;
         snprintf(contact, sizeof contact, "'contact': {'distance': %g},", given[i]);
-        scene s = scene_open(STRUCK, contact, "newton_k");
+        scoped_scene s = scene_open(STRUCK, contact, "newton_k");
         ck_assert_double_eq(strike(&s, 5, PLENTY), given[i]);
         for (int k = 0; drape_sim_warning(s.sim, k, &warning); k++)
             warned = warned || strcmp(warning.name, "contact_distance") == 0;
         ck_assert_int_eq(warned, i == 0);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* Without time for anything a call makes one attempt. Rejected ones halve the step from call to call, until
  * one is accepted. */
-START_TEST(a_rejected_step_is_retried_by_the_next_call)
+TEST(a_rejected_step_is_retried_by_the_next_call)
 {
-    scene s = scene_open(STRUCK, "'contact': {'distance': 1e-4},", "newton_k");
+    scoped_scene s = scene_open(STRUCK, "'contact': {'distance': 1e-4},", "newton_k");
     int rejected = 0;
     for (int k = 1; k <= 60; k++) {
         const double to[3] = {0, 0, k % 2 ? -0.8 : 0};
@@ -352,14 +324,12 @@ START_TEST(a_rejected_step_is_retried_by_the_next_call)
     }
     ck_assert_int_gt(rejected, 0);
     ck_assert_double_gt(drape_sim_time(s.sim), 0);
-    scene_close(&s);
 }
-END_TEST
 
 /* Time is dropped, and steps are not longer than dt. */
-START_TEST(steps_in_contact_are_not_longer_than_dt)
+TEST(steps_in_contact_are_not_longer_than_dt)
 {
-    scene s = scene_open(STRUCK, "", "newton_k");
+    scoped_scene s = scene_open(STRUCK, "", "newton_k");
     int touching = 0;
     strike(&s, 12, PLENTY);
     for (int k = 13; k < 24; k++) {
@@ -372,21 +342,19 @@ START_TEST(steps_in_contact_are_not_longer_than_dt)
         ck_assert(!touches || (r.attempts == 1 && r.h <= (1 + 1e-9) / 60 && r.debt <= (1 + 1e-9) / 60));
     }
     ck_assert_int_gt(touching, 5);
-    scene_close(&s);
 }
-END_TEST
 
 /* A strip is folded up beside its pinned row, 12 mm from it, and the pins go through that place: 30 mm in a
  * step, in which free nodes that keep still are passed. All of the cloth follows them instead, in a step that
  * is not rejected, and the fold stays on its side. */
-START_TEST(pins_do_not_pass_through_cloth)
+TEST(pins_do_not_pass_through_cloth)
 {
     static const char text[] =
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 8, 'width': 0.2, 'height': "
         "0.28, 'orientation': 'vertical'}, 'material': {'young_modulus': 968246, 'thickness': 1.0328e-3, "
         "'areal_density': 0.2}, 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'row': 0}]}],"
         "'self_contact': {'thickness': 0.004}, 'integrator': {'method': 'newton_k'}, 'duration': 4}";
-    scene s = scene_open(text);
+    scoped_scene s = scene_open(text);
     const int32_t n = s.model->node_count;
     double x[3 * 40], pins[15], still[3 * 40] = {0};
     int32_t rows[5];
@@ -411,9 +379,7 @@ START_TEST(pins_do_not_pass_through_cloth)
     const double *at = drape_sim_positions(s.sim);
     for (int i = 0; i < 5; i++)
         ck_assert_double_gt(at[3 * (20 + i) + 2], at[3 * i + 2]);
-    scene_close(&s);
 }
-END_TEST
 
 #define LAYER                                                                                                \
     "{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.5, 'height': 0.5, 'orientation': "      \
@@ -425,7 +391,7 @@ END_TEST
  * nine steps of dt; so may be the impact, which twenty iterations do not solve. */
 static void push_layers(const char *pins)
 {
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [" LAYER ", " LAYER ", " LAYER "], 'self_contact': {'thickness': "
                    "0.002}, 'colliders': [{'type': 'sphere', 'center': [0, -0.12, 0], 'radius': 0.1,"
                    "'track': [[0, [0, 0, 0]], [0.5, [0, 1, 0]]]}],"
@@ -439,20 +405,10 @@ static void push_layers(const char *pins)
     const double *x = drape_sim_positions(s.sim);
     for (size_t i = 0; i < (size_t)s.model->node_count; i++)
         ck_assert_double_ge(hypot(hypot(x[3 * i], x[3 * i + 1] + 0.12 - 0.3), x[3 * i + 2]), 0.1);
-    scene_close(&s);
 }
 
-START_TEST(a_ball_takes_all_layers_along)
+TEST(a_ball_takes_all_layers_along)
 {
     push_layers("");
     push_layers(", 'pins': [{'row': 0, 'track': [[0, [0, 0, 0]], [0.5, [0, 0.2, 0]]]}]");
 }
-END_TEST
-
-SUITE("realtime", a_ball_takes_all_layers_along, pins_do_not_pass_through_cloth,
-      few_iterations_are_near_the_converged_step, with_many_iterations_the_step_is_backward_euler,
-      the_step_includes_contact_and_damping, contact_holds_back_only_what_it_touches,
-      the_level_degrades_and_recovers, dropped_time_has_a_warning, a_single_late_frame_is_made_up_for,
-      every_integrator_with_a_time_takes_frames, a_fast_body_is_served_by_the_default_distance,
-      the_distance_is_there_before_the_body, starved_steps_make_no_energy, a_distance_that_is_given_is_kept,
-      a_rejected_step_is_retried_by_the_next_call, steps_in_contact_are_not_longer_than_dt)

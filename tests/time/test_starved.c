@@ -14,8 +14,7 @@
 static drape_realtime advance(scene *s, double frame)
 {
     drape_realtime report;
-    drape_status status = drape_sim_advance_realtime(s->sim, frame, NOTHING, &report);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_sim_advance_realtime(s->sim, frame, NOTHING, &report));
     return report;
 }
 
@@ -43,9 +42,9 @@ static double largest_strain(const scene *s)
 /* The host's frames are several times as long as the steps that are made of them. Pins that go at a steady
  * speed go at that speed in each step nevertheless: what was dropped, the whole cloth makes at once, with the
  * body that goes with the pins. The other body, which rests, stays. */
-START_TEST(pins_take_the_cloth_along)
+TEST(pins_take_the_cloth_along)
 {
-    scene s = scene_open(FLAG);
+    scoped_scene s = scene_open(FLAG);
     double debt = 0, pins[27];
     int32_t row[9];
     for (int32_t i = 0; i < 9; i++)
@@ -72,15 +71,13 @@ START_TEST(pins_take_the_cloth_along)
         ck_assert_double_eq(at[0], 0);
     }
     ck_assert_double_lt(largest_strain(&s), 0.03);
-    scene_close(&s);
 }
-END_TEST
 
 /* A body that goes past cloth at rest goes at no more than one and a half times its speed (HURRY), and what
  * it is behind is reported; when there is time again it is where it is sent, after a while. */
-START_TEST(bodies_do_not_catch_up_at_once)
+TEST(bodies_do_not_catch_up_at_once)
 {
-    scene s = scene_open(FLAG);
+    scoped_scene s = scene_open(FLAG);
     double debt = 0, most = 0;
     for (int k = 1; k <= 60; k++) {
         const double to[3] = {0, SPEED * FRAME * k, 0}, t = drape_sim_time(s.sim);
@@ -98,9 +95,7 @@ START_TEST(bodies_do_not_catch_up_at_once)
     }
     ck_assert_double_gt(most, FRAME);
     ck_assert_double_eq_tol(debt, 0, EXACT);
-    scene_close(&s);
 }
-END_TEST
 
 #define PLATE                                                                                                \
     "{'name': '%s', 'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.2, 'height': 0.2,"        \
@@ -112,9 +107,9 @@ END_TEST
 
 /* Pinned plates that close upon free cloth and each other pass through both. That is reported as long as it
  * is so, and never by a call that is accurate. */
-START_TEST(crossings_are_reported)
+TEST(crossings_are_reported)
 {
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 13, 'rows': 13,"
         " 'width': 0.5, 'height': 0.5, 'orientation': 'vertical', 'transform': {'translate':"
         " [-0.25, 0.5, 0]}}, 'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
@@ -137,9 +132,7 @@ START_TEST(crossings_are_reported)
     for (int i = 0; !warned && drape_sim_warning(s.sim, i, &warning); i++)
         warned = strcmp(warning.name, "crossings") == 0;
     ck_assert(warned);
-    scene_close(&s);
 }
-END_TEST
 
 #define SHEET                                                                                                \
     "{'name': '%s', 'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.4, 'height': 0.4,"        \
@@ -147,12 +140,13 @@ END_TEST
     "{'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', 'bend.hinge']}"
 
 /* A sheet that begins across a corner of another one: contact would keep both so. */
-START_TEST(crossings_are_taken_apart)
+TEST(crossings_are_taken_apart)
 {
-    scene s = scene_open("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 0.004},"
-                         "'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}],"
-                         "'integrator': {'method': 'newton_k'}, 'duration': 3}",
-                         "low", 0., 0.02, 0., "0, 1, 0, 0", "high", 0.13, 0.1, 0.09, "1, 0, 0.3, -20");
+    scoped_scene s =
+        scene_open("{'drape': 1, 'cloth': [" SHEET ", " SHEET "], 'self_contact': {'thickness': 0.004},"
+                   "'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}],"
+                   "'integrator': {'method': 'newton_k'}, 'duration': 3}",
+                   "low", 0., 0.02, 0., "0, 1, 0, 0", "high", 0.13, 0.1, 0.09, "1, 0, 0.3, -20");
     drape_realtime r = {.crossings = 0};
     ck_assert_int_gt((int)drape_sim_intersections(s.sim, -1), 0);
     for (int k = 1; k <= 60; k++) {
@@ -160,9 +154,4 @@ START_TEST(crossings_are_taken_apart)
         ck_assert_int_eq((int)r.crossings, (int)drape_sim_intersections(s.sim, -1));
     }
     ck_assert_int_eq((int)r.crossings, 0);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("starved", pins_take_the_cloth_along, bodies_do_not_catch_up_at_once, crossings_are_reported,
-      crossings_are_taken_apart)

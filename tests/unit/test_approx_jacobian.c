@@ -43,14 +43,16 @@ static void close_lattice(lattice *l)
     free(l->neighbor);
 }
 
+#define scoped_lattice SCOPED(close_lattice) lattice
+
 /* At each node the functions are positive and add up to 1, up to a few roundings of 16 values. Seeds are at
  * least a spacing apart, so balls of a radius below half of it are disjoint: on this lattice a ball of
  * radius r has 2 r (r + 1) + 1 nodes, at the rim at least half of them. */
-START_TEST(coarse_functions_are_a_partition_of_unity)
+TEST(coarse_functions_are_a_partition_of_unity)
 {
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     for (int spacing = 2; spacing <= 8; spacing++) {
-        lattice l = open_lattice(31);
+        scoped_lattice l = open_lattice(31);
         drape_arena memory = drape_arena_of(s.ctx);
         drape_prolong p;
         ck_assert_int_eq(drape_prolong_build(&memory, &l.graph, spacing, &p), DRAPE_OK);
@@ -67,17 +69,14 @@ START_TEST(coarse_functions_are_a_partition_of_unity)
             ck_assert_double_eq_tol(sum, 1, 64 * DBL_EPSILON);
         }
         drape_arena_free(&memory);
-        close_lattice(&l);
     }
-    scene_close(&s);
 }
-END_TEST
 
 /* P' and P are transposes: (P' x) . y = x . (P y). */
-START_TEST(restriction_is_the_transpose)
+TEST(restriction_is_the_transpose)
 {
-    scene s = scene_empty();
-    lattice l = open_lattice(12);
+    scoped_scene s = scene_empty();
+    scoped_lattice l = open_lattice(12);
     drape_arena memory = drape_arena_of(s.ctx);
     drape_prolong p;
     ck_assert_int_eq(drape_prolong_build(&memory, &l.graph, 4, &p), DRAPE_OK);
@@ -101,15 +100,12 @@ START_TEST(restriction_is_the_transpose)
     free(px);
     free(py);
     drape_arena_free(&memory);
-    close_lattice(&l);
-    scene_close(&s);
 }
-END_TEST
 
 /* Without edges each node has a function of its own. */
-START_TEST(nodes_without_neighbours_are_alone)
+TEST(nodes_without_neighbours_are_alone)
 {
-    scene s = scene_empty();
+    scoped_scene s = scene_empty();
     int32_t start[4] = {0, 0, 0, 0}, none;
     const drape_graph graph = {.count = 3, .start = start, .neighbor = &none};
     drape_arena memory = drape_arena_of(s.ctx);
@@ -119,9 +115,7 @@ START_TEST(nodes_without_neighbours_are_alone)
     for (int i = 0; i < 3; i++)
         ck_assert(p.weight[i] == 1 && p.column[i] == i);
     drape_arena_free(&memory);
-    scene_close(&s);
 }
-END_TEST
 
 /* ---- Conjugate gradients ---- */
 
@@ -139,7 +133,7 @@ static void leave(const void *owner, const double *r, double *z)
 }
 
 /* There are as many iterations as distinct eigenvalues: 3 here. */
-START_TEST(conjugate_gradients_end_with_the_eigenvalues)
+TEST(conjugate_gradients_end_with_the_eigenvalues)
 {
     const double d[6] = {1, 1, 5, 5, 9, 9}, b[6] = {1, 2, 3, 4, 5, 6};
     double r[6], z[6], p[6], q[6], x[6];
@@ -157,9 +151,8 @@ START_TEST(conjugate_gradients_end_with_the_eigenvalues)
     for (int i = 0; i < 6; i++)
         ck_assert_double_eq_tol(x[i], b[i] / d[i], 1e-12);
 }
-END_TEST
 
-START_TEST(negative_curvature_is_reported)
+TEST(negative_curvature_is_reported)
 {
     const double d[6] = {-1, -1, -1, -1, -1, -1}, b[6] = {1, 2, 3, 4, 5, 6};
     double r[6], z[6], p[6], q[6], x[6];
@@ -175,7 +168,6 @@ START_TEST(negative_curvature_is_reported)
     ck_assert(!s.definite && !s.converged);
     ck_assert_mem_eq(x, b, sizeof b); /* x still goes downhill */
 }
-END_TEST
 
 /* ---- The matrix ---- */
 
@@ -241,6 +233,8 @@ static void close_state(state *q)
     scene_close(&q->s);
 }
 
+#define scoped_state SCOPED(close_state) state
+
 /* Largest |A x - (m_w M + J+) x| over the largest component of A x, for a random x along `direction`, or in
  * all directions. */
 static double mismatch(state *q, double mass_weight, const double *direction)
@@ -265,9 +259,9 @@ static double mismatch(state *q, double mass_weight, const double *direction)
 }
 
 /* For pairs, energies and dissipation it is the positive part of the Jacobian itself, at any state. */
-START_TEST(without_bending_it_is_the_positive_jacobian)
+TEST(without_bending_it_is_the_positive_jacobian)
 {
-    state q =
+    scoped_state q =
         open_state(9, "'stretch.edge', {'type': 'damp.kelvin_voigt', 'beta': 0.01},"
                       "{'type': 'drag.viscous', 'coefficient': 0.3}, {'type': 'limit.strain', 'limit': 0.3}");
     uint64_t seed = 3;
@@ -280,27 +274,23 @@ START_TEST(without_bending_it_is_the_positive_jacobian)
     q.point.history = history;
     ck_assert_double_lt(mismatch(&q, 3600, NULL), 1e-12);
     free(history);
-    close_state(&q);
 }
-END_TEST
 
 /* For hinges of a flat sheet all gradients lie along the normal, and in that direction it is the Jacobian. */
-START_TEST(across_a_flat_sheet_bending_is_exact)
+TEST(across_a_flat_sheet_bending_is_exact)
 {
     static const double normal[3] = {0, 1, 0};
-    state q = open_state(9, "'bend.hinge'");
+    scoped_state q = open_state(9, "'bend.hinge'");
     ck_assert_double_lt(mismatch(&q, 3600, normal), 1e-12);
-    close_state(&q);
 }
-END_TEST
 
 /* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. The number of iterations does not grow with the sheet: the
  * condition number of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which
  * plain conjugate gradients take hundreds. */
-START_TEST(it_is_solved_in_few_iterations_at_any_size)
+TEST(it_is_solved_in_few_iterations_at_any_size)
 {
     for (int side = 11; side <= 31; side += 10) {
-        state q = open_state(side, "'stretch.edge', 'bend.hinge'");
+        scoped_state q = open_state(side, "'stretch.edge', 'bend.hinge'");
         double *b = calloc(q.n, sizeof *b), xax = 0, xay = 0, yax = 0, left = 0, all = 0;
         uint64_t seed = 8;
         for (size_t i = 0; i < 3 * (size_t)q.s.model->node_count; i++)
@@ -320,29 +310,26 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
         }
         ck_assert_double_gt(xax, 0);
         ck_assert_double_lt(left, 1e-6 * all); /* in the plain norm: the condition of P is below 1e6 */
-        double *ab = calloc(q.n, sizeof *ab);
+        scoped_memory double *ab = calloc(q.n, sizeof *ab);
         drape_approx_jacobian_multiply(q.jacobian, b, ab);
         for (size_t i = 0; i < q.n; i++)
             xay += q.x[i] * ab[i];
         ck_assert_double_eq_tol(xay, yax, 1e-10 * fabs(yax) + 1e-10);
-        free(ab);
         free(b);
-        close_state(&q);
     }
 }
-END_TEST
 
 /* ---- The factored matrix ---- */
 
 /* Without bending it is m_w M + J+ itself at any state, and A (A^-1 b) = b up to the condition of a stiff
  * sheet, 1e5, times rounding. */
-START_TEST(factored_matrix_is_the_positive_jacobian)
+TEST(factored_matrix_is_the_positive_jacobian)
 {
-    state q = open_state(9, "'stretch.cst'");
+    scoped_state q = open_state(9, "'stretch.cst'");
     const drape_model *m = q.s.model;
     drape_factored_jacobian *jacobian;
     uint64_t seed = 3;
-    double *b = calloc(q.n, sizeof *b);
+    scoped_memory double *b = calloc(q.n, sizeof *b);
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
         q.at.x[i] = 1.1 * q.at.x[i] + 0.01 * random_number(&seed);
     for (size_t i = 0; i < q.n; i++)
@@ -364,19 +351,16 @@ START_TEST(factored_matrix_is_the_positive_jacobian)
         ck_assert_double_eq_tol(b[i], 0, 1e-9);
     ck_assert_int_eq(q.work.factorizations, 1);
     drape_factored_jacobian_ops.destroy(jacobian);
-    free(b);
-    close_state(&q);
 }
-END_TEST
 
 /* With bending lumped in the factors, conjugate gradients solve with the matrix that another system factors
  * whole: at steps of 100 s bending exceeds the inertia so far that it is not lumped. Values without it are
  * in a smaller pattern. The tolerance is in the norm of N^-1, whose condition is that of the stiff sheet,
  * 1e5. */
-START_TEST(lumped_factors_solve_with_all_of_bending)
+TEST(lumped_factors_solve_with_all_of_bending)
 {
-    state q = open_state(9, "'stretch.cst', 'bend.midedge'"),
-          whole = open_state(9, "'stretch.cst', 'bend.midedge'");
+    scoped_state q = open_state(9, "'stretch.cst', 'bend.midedge'"),
+                 whole = open_state(9, "'stretch.cst', 'bend.midedge'");
     const drape_pattern *p = &whole.s.model->pattern;
     drape_factored_jacobian *jacobian, *reference;
     uint64_t seed = 5;
@@ -403,20 +387,18 @@ START_TEST(lumped_factors_solve_with_all_of_bending)
     drape_factored_jacobian_ops.destroy(jacobian);
     drape_factored_jacobian_ops.destroy(reference);
     free(b);
-    close_state(&q);
-    close_state(&whole);
 }
-END_TEST
 
 /* Drag of the wind is not symmetric, and neighbouring triangles cancel much of it: it has no positive parts.
  * Factored is the symmetric part of the matrix as it is, and solutions are those with all of it, up to the
  * tolerance of nonsymmetric.c, 1e-4. That of the factors alone is off by more. */
-START_TEST(factored_matrix_is_corrected_for_drag)
+TEST(factored_matrix_is_corrected_for_drag)
 {
-    state q = open_state(5, "{'type': 'drag.wind', 'wind': [5, 0, 2]}");
+    scoped_state q = open_state(5, "{'type': 'drag.wind', 'wind': [5, 0, 2]}");
     drape_factored_jacobian *jacobian;
     uint64_t seed = 4;
-    double *b = calloc(q.n, sizeof *b), *exact = calloc((size_t)q.s.model->pattern.nonzeros, sizeof *exact);
+    scoped_memory double *b = calloc(q.n, sizeof *b),
+                         *exact = calloc((size_t)q.s.model->pattern.nonzeros, sizeof *exact);
     const drape_pattern *p = &q.s.model->pattern;
     bool better, needed;
     for (size_t i = 0; i < 3 * (size_t)q.s.model->node_count; i++)
@@ -447,15 +429,4 @@ START_TEST(factored_matrix_is_corrected_for_drag)
         left += b[i] * b[i];
     ck_assert_double_lt(left, 1e-8 * whole);
     drape_factored_jacobian_ops.destroy(jacobian);
-    free(exact);
-    free(b);
-    close_state(&q);
 }
-END_TEST
-
-SUITE("approx_jacobian", coarse_functions_are_a_partition_of_unity, restriction_is_the_transpose,
-      nodes_without_neighbours_are_alone, conjugate_gradients_end_with_the_eigenvalues,
-      negative_curvature_is_reported, without_bending_it_is_the_positive_jacobian,
-      across_a_flat_sheet_bending_is_exact, it_is_solved_in_few_iterations_at_any_size,
-      factored_matrix_is_the_positive_jacobian, lumped_factors_solve_with_all_of_bending,
-      factored_matrix_is_corrected_for_drag)

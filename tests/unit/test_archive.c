@@ -29,13 +29,6 @@ static object make_object(void)
     return o;
 }
 
-static drape_context *open_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 /* ---- Rows ---- */
 
 static void archive_array(drape_archive *a, double *values)
@@ -90,10 +83,10 @@ static bytes write_object(drape_context *ctx, drape_write_rows *write_rows)
     return b;
 }
 
-START_TEST(rows_in_any_order_make_the_same_bytes)
+TEST(rows_in_any_order_make_the_same_bytes)
 {
-    drape_context *ctx = open_context();
-    bytes one = write_object(ctx, NULL), rows = write_object(ctx, keep_rows);
+    scoped_context *ctx = make_context();
+    scoped_bytes one = write_object(ctx, NULL), rows = write_object(ctx, keep_rows);
     ck_assert_uint_eq(rows.size, one.size);
     ck_assert_mem_eq(rows.data, one.data, one.size);
     drape_archive a;
@@ -104,11 +97,7 @@ START_TEST(rows_in_any_order_make_the_same_bytes)
     ck_assert_mem_eq(o.array, expected.array, sizeof o.array);
     ck_assert_mem_eq(o.other, expected.other, sizeof o.other);
     ck_assert(o.flag && o.number == expected.number && o.value == expected.value);
-    free(one.data);
-    free(rows.data);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- The checksum ---- */
 
@@ -123,10 +112,10 @@ static void refused(drape_context *ctx, const unsigned char *data, size_t size, 
 
 /* All 255 other values of each byte; those of the format's number are of another format, if its checksum is
  * right or was another one. */
-START_TEST(each_changed_byte_is_detected)
+TEST(each_changed_byte_is_detected)
 {
-    drape_context *ctx = open_context();
-    bytes b = write_object(ctx, NULL);
+    scoped_context *ctx = make_context();
+    scoped_bytes b = write_object(ctx, NULL);
     for (size_t at = 0; at < b.size; at++) {
         const unsigned char before = b.data[at];
         for (int value = 0; value < 256; value++) {
@@ -137,16 +126,13 @@ START_TEST(each_changed_byte_is_detected)
         }
         b.data[at] = before;
     }
-    free(b.data);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* A sum of words without their places would not see that two of them change places. */
-START_TEST(words_that_change_places_are_detected)
+TEST(words_that_change_places_are_detected)
 {
-    drape_context *ctx = open_context();
-    bytes b = write_object(ctx, NULL);
+    scoped_context *ctx = make_context();
+    scoped_bytes b = write_object(ctx, NULL);
     unsigned char *copy = malloc(b.size);
     ck_assert_ptr_nonnull(copy);
     size_t swaps = 0;
@@ -162,16 +148,13 @@ START_TEST(words_that_change_places_are_detected)
         }
     ck_assert_uint_gt(swaps, 20000);
     free(copy);
-    free(b.data);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Also by zeros, which the sum of the last word is padded with. */
-START_TEST(other_lengths_are_detected)
+TEST(other_lengths_are_detected)
 {
-    drape_context *ctx = open_context();
-    bytes b = write_object(ctx, NULL);
+    scoped_context *ctx = make_context();
+    scoped_bytes b = write_object(ctx, NULL);
     unsigned char *copy = calloc(b.size + 64, 1);
     ck_assert_ptr_nonnull(copy);
     memcpy(copy, b.data, b.size);
@@ -184,10 +167,4 @@ START_TEST(other_lengths_are_detected)
         refused(ctx, copy, b.size - cut, DRAPE_E_PARSE, "gap", cut);
     }
     free(copy);
-    free(b.data);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("archive", rows_in_any_order_make_the_same_bytes, each_changed_byte_is_detected,
-      words_that_change_places_are_detected, other_lengths_are_detected)

@@ -61,8 +61,7 @@ static void record(scene *s, const frames_folder *f, const char *format)
     snprintf(out, sizeof out, "%s/out", f->path);
     const drape_recorder_def def = {.folder = out, .formats = &format, .format_count = 1};
     drape_recorder *recorder = NULL;
-    const drape_status status = drape_recorder_create(s->ctx, s->sim, &def, &recorder);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_recorder_create(s->ctx, s->sim, &def, &recorder));
     ck_assert_int_eq(drape_sim_advance(s->sim, .1), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_done(recorder).frames, FRAMES);
@@ -141,7 +140,7 @@ static double box_distance(const double *x)
     return fabs(most);
 }
 
-START_TEST(glb_has_colliders_that_move)
+TEST(glb_has_colliders_that_move)
 {
     frames_folder f = frames_folder_make();
     scene s = bodies_scene(&f, "z"); /* which changes nothing here */
@@ -167,8 +166,9 @@ START_TEST(glb_has_colliders_that_move)
     for (size_t n = 2; n < 5; n++) {
         size_t count, corners;
         const json_t *primitive = item(item(g.json, "meshes", (json_int_t)n), "primitives", 0);
-        float *x = floats(&g, number(json_object_get(primitive, "attributes"), "POSITION"), 3, &count);
-        float *index = floats(&g, number(primitive, "indices"), 1, &corners);
+        scoped_memory float *x =
+            floats(&g, number(json_object_get(primitive, "attributes"), "POSITION"), 3, &count);
+        scoped_memory float *index = floats(&g, number(primitive, "indices"), 1, &corners);
         ck_assert_uint_ge(count, 4);
         for (size_t i = 0; i < count; i++) {
             const double p[3] = {(double)x[3 * i], (double)x[3 * i + 1], (double)x[3 * i + 2]};
@@ -179,16 +179,15 @@ START_TEST(glb_has_colliders_that_move)
         }
         for (size_t i = 0; i < corners; i++)
             ck_assert_uint_lt(word_at((const char *)index, 4 * i), count);
-        free(x);
-        free(index);
     }
     for (size_t n = 2; n < 4; n++) {
         size_t frames, same;
-        float *times = floats(&g, number(channel_of(&g, n, "translation"), "input"), 1, &frames);
-        float *moves = floats(&g, number(channel_of(&g, n, "translation"), "output"), 3, &same);
+        scoped_memory float *times =
+            floats(&g, number(channel_of(&g, n, "translation"), "input"), 1, &frames);
+        scoped_memory float *moves = floats(&g, number(channel_of(&g, n, "translation"), "output"), 3, &same);
         ck_assert_uint_eq(frames, FRAMES);
         ck_assert_uint_eq(same, FRAMES);
-        float *turns = floats(&g, number(channel_of(&g, n, "rotation"), "output"), 4, &same);
+        scoped_memory float *turns = floats(&g, number(channel_of(&g, n, "rotation"), "output"), 4, &same);
         ck_assert_uint_eq(same, FRAMES);
         for (size_t k = 0; k < FRAMES; k++) {
             const double t = (double)times[k], angle = n == 3 ? t / .1 * acos(0) : 0;
@@ -206,9 +205,6 @@ START_TEST(glb_has_colliders_that_move)
             for (size_t i = 0; i < 3; i++)
                 ck_assert_double_eq_tol((double)moves[3 * k + i], expected[i], 4 * TOLERANCE);
         }
-        free(times);
-        free(moves);
-        free(turns);
     }
     /* the ball that grows: first frame and targets */
     const json_t *primitive = item(item(g.json, "meshes", 1), "primitives", 0);
@@ -217,14 +213,14 @@ START_TEST(glb_has_colliders_that_move)
     float *x = floats(&g, number(json_object_get(primitive, "attributes"), "POSITION"), 3, &count);
     ck_assert_uint_eq(count, POINTS);
     for (int k = 0; k < FRAMES; k++) {
-        float *d = k ? floats(&g, number(item(primitive, "targets", k - 1), "POSITION"), 3, &same) : NULL;
+        scoped_memory float *d =
+            k ? floats(&g, number(item(primitive, "targets", k - 1), "POSITION"), 3, &same) : NULL;
         for (size_t i = 0; i < count; i++) {
             double p[3];
             for (size_t c = 0; c < 3; c++)
                 p[c] = (double)x[3 * i + c] + (d ? (double)d[3 * i + c] : 0) + (c == 0 ? 2 : 0);
             ck_assert_double_eq_tol(hypot(hypot(p[0], p[1]), p[2]), ball_radius(.025 * k), TOLERANCE);
         }
-        free(d);
     }
     free(x);
     json_decref(g.json);
@@ -232,7 +228,6 @@ START_TEST(glb_has_colliders_that_move)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* ---- VTK ---- */
 
@@ -263,7 +258,7 @@ static const double *vtp_points(const frames_folder *f, const char *name, size_t
 }
 
 /* The collection has each collider as a part of each frame; with z up, (x, y, z) is at (x, -z, y). */
-START_TEST(vtp_has_colliders_as_parts)
+TEST(vtp_has_colliders_as_parts)
 {
     frames_folder f = frames_folder_make();
     scene s = bodies_scene(&f, "z");
@@ -279,7 +274,7 @@ START_TEST(vtp_has_colliders_as_parts)
                 snprintf(name, sizeof name, "collider_%d_%06d.vtp", b, k);
             snprintf(entry, sizeof entry, "part=\"%d\" file=\"%s\"/>", b + 1, name);
             ck_assert_msg(strstr(pvd, entry) != NULL, "%s", entry);
-            double *x = (double *)vtp_points(&f, name, &count, &data);
+            scoped_memory double *x = (double *)vtp_points(&f, name, &count, &data);
             const double t = .025 * k, angle = t / .1 * acos(0);
             for (size_t i = 0; i < count; i++) {
                 double *p = x + 3 * i;
@@ -297,7 +292,6 @@ START_TEST(vtp_has_colliders_as_parts)
                 ck_assert_msg(fabs(off) < TOLERANCE, "frame %d, collider %d, vertex %zu: %g m off", k, b, i,
                               off);
             }
-            free(x);
             free(data);
         }
     }
@@ -314,6 +308,3 @@ START_TEST(vtp_has_colliders_as_parts)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
-
-SUITE("bodies", glb_has_colliders_that_move, vtp_has_colliders_as_parts)

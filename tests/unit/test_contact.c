@@ -232,24 +232,22 @@ static void check_kind(drape_pair_kind kind, double speed, double low)
     ck_assert_int_ge(tried, 100);
 }
 
-START_TEST(test_triangle)
+TEST(test_triangle)
 {
     check_kind(DRAPE_PAIR_TRIANGLE, 1, DRAPE_LEAST_GAP);    /* sliding */
     check_kind(DRAPE_PAIR_TRIANGLE, 0.01, DRAPE_LEAST_GAP); /* sticking */
     check_kind(DRAPE_PAIR_TRIANGLE, 1, DRAPE_BARRIER_BOUNDED);
 }
-END_TEST
 
-START_TEST(test_segments)
+TEST(test_segments)
 {
     check_kind(DRAPE_PAIR_SEGMENTS, 1, DRAPE_LEAST_GAP);
     check_kind(DRAPE_PAIR_SEGMENTS, 0.01, DRAPE_LEAST_GAP);
     check_kind(DRAPE_PAIR_SEGMENTS, 1, DRAPE_BARRIER_BOUNDED);
 }
-END_TEST
 
 /* Nearly parallel edges above each other, where the mollifier acts. */
-START_TEST(test_parallel)
+TEST(test_parallel)
 {
     uint64_t seed = 3;
     for (int k = 0; k < 200; k++) {
@@ -277,10 +275,9 @@ START_TEST(test_parallel)
         check_derivatives(&s, 2e-9, 1e-4);
     }
 }
-END_TEST
 
 /* For parallel edges the energy is 0, whatever their closest points are. */
-START_TEST(test_mollified_away)
+TEST(test_mollified_away)
 {
     setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
                  .law = {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3},
@@ -288,7 +285,6 @@ START_TEST(test_mollified_away)
                  .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
     ck_assert_double_eq(energy_of(&s), 0);
 }
-END_TEST
 
 /* The barrier is C2 where it begins and where its parabola takes over, and its force is always repulsive. */
 static void check_barrier(double low)
@@ -310,7 +306,7 @@ static void check_barrier(double low)
 }
 
 /* The bounded one is C2 where it begins: b''' is at most 6. Its force grows with depth, to the scale. */
-START_TEST(test_bounded_barrier)
+TEST(test_bounded_barrier)
 {
     const double e = 1e-9;
     const drape_barrier at = drape_barrier_at(1 - e, DRAPE_BARRIER_BOUNDED);
@@ -324,12 +320,11 @@ START_TEST(test_bounded_barrier)
     /* 1 + b' = (3 y + 1) / (1 + y)^3, the y^2 of the numerator cancel: 3/y^2 of the scale is left */
     ck_assert_double_eq_tol(-drape_barrier_at(-999, DRAPE_BARRIER_BOUNDED).db, 1, 4e-6);
 }
-END_TEST
 
 /* At the least gap it withstands 1/DRAPE_LEAST_GAP times its scale: b' = -1/s to a hundredth there, as 2
  * s ln s and 2 s are. The gentle one agrees with it from DRAPE_BARRIER_PARABOLA on, so that a pair that
  * comes out keeps its energy. */
-START_TEST(test_barrier)
+TEST(test_barrier)
 {
     check_barrier(DRAPE_BARRIER_PARABOLA);
     check_barrier(DRAPE_LEAST_GAP);
@@ -342,7 +337,6 @@ START_TEST(test_barrier)
                             drape_barrier_at(s, DRAPE_BARRIER_PARABOLA).db);
     }
 }
-END_TEST
 
 /* On a path that is reported as free, the gap never falls below what must be kept of it. A path that is
  * not free is cut before that, and after most of the rest is gone. A trial state
@@ -393,7 +387,7 @@ static void check_step_fraction(const drape_keep *keep, double distance)
     ck_assert_int_eq(below > 0, distance > 1);
 }
 
-START_TEST(test_step_fraction)
+TEST(test_step_fraction)
 {
     const drape_keep trial = {.rounding = 1e-12, .least = 1, .above = 0.5, .below = 0.5},
                      step = {.rounding = 1e-12, .least = 0.5, .below = 0.5};
@@ -401,11 +395,10 @@ START_TEST(test_step_fraction)
     check_step_fraction(&step, 0.2);
     check_step_fraction(&step, 10); /* least gap: 1 cm */
 }
-END_TEST
 
 /* A trial state may bring a pair from far beyond the activation distance to a share of it at once, and one
  * from just beyond it as far as if it were within. */
-START_TEST(test_arrival)
+TEST(test_arrival)
 {
     const drape_keep trial = {.least = 1, .above = 0.5, .below = 0.5, .arrival = 0.4};
     ck_assert_double_eq(drape_keep_gap(&trial, 1e-5, 1, 0.01), 0.4 * 0.01);
@@ -414,11 +407,10 @@ START_TEST(test_arrival)
     ck_assert_double_eq(drape_keep_gap(&trial, 0, 0.009, 0.01), 0.5 * 0.009);
     ck_assert_double_eq(drape_keep_gap(&trial, 0, 0.0101, 0.01), 0.4 * 0.01);
 }
-END_TEST
 
 /* A path that ends beyond the other piece is never free, however little the gap is, down to a tenth of the
  * rounding: a pair at the least gap of rounding is not exempt if the rounding becomes larger. */
-START_TEST(test_no_gap_is_exempt)
+TEST(test_no_gap_is_exempt)
 {
     const drape_keep step = {.rounding = 1e-12, .least = 0.5, .below = 0.5};
     for (int collider = -1; collider < 1; collider++)
@@ -431,7 +423,6 @@ START_TEST(test_no_gap_is_exempt)
             ck_assert_double_lt(drape_pair_step_fraction(&pair, x, y, NULL, &step, 1), 1);
         }
 }
-END_TEST
 
 typedef struct found {
     int32_t elements[1000];
@@ -580,9 +571,9 @@ static void check_join(drape_arena *arena, int32_t count, int32_t others)
     }
 }
 
-START_TEST(test_join)
+TEST(test_join)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
     for (int32_t count = 0; count < 6; count++)
@@ -591,15 +582,13 @@ START_TEST(test_join)
     check_join(&arena, 3, 100);
     check_join(&arena, 100, 77);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Pairs of two stages, each in any order, some with the same piece: by rank, all of them, and what is
  * sorted stays. */
-START_TEST(test_sort)
+TEST(test_sort)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
     drape_pair_sorter sorter = {.arena = &arena};
@@ -624,26 +613,22 @@ START_TEST(test_sort)
         ck_assert_int_eq(memcmp(before, pairs, sizeof pairs), 0);
     }
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(test_tree)
+TEST(test_tree)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
     for (int32_t count = 0; count < 8; count++)
         check_tree(&arena, count);
     check_tree(&arena, 200);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* The bounds are below the distance anywhere on the path, and positive for most pieces that pass each
  * other at a distance. */
-START_TEST(test_bounds)
+TEST(test_bounds)
 {
     uint64_t seed = 11;
     int positive = 0;
@@ -674,12 +659,11 @@ START_TEST(test_bounds)
     }
     ck_assert_int_gt(positive, 1000);
 }
-END_TEST
 
 /* The secant of a predicted force ends at the gap where the law has that force, to 20 bisections of its
  * logarithm over a factor of 1000: 1e-5 of the gap; with restitution, its rate changes as well. Close to the
  * present force it is the tangent. */
-START_TEST(test_predicted)
+TEST(test_predicted)
 {
     for (int k = 0; k < 2; k++) {
         const drape_contact_law law = {.distance = 0.2,
@@ -705,17 +689,16 @@ START_TEST(test_predicted)
         }
     }
 }
-END_TEST
 
 /* What is kept of a contact is not used for another gap, weight, velocity or force. */
-START_TEST(test_kept_predictions)
+TEST(test_kept_predictions)
 {
     const drape_contact_law law = {.distance = 0.2, .low = DRAPE_LEAST_GAP, .stiffness = 3};
     drape_active_contact contact = {
         .pair = {.node = {1, -1, -1, -1}, .collider = 0},
         .gap = {.value = 0.02, .closest = {.points = 1, .c = {1}, .normal = {0, 1, 0}}, .m = 1}};
     double v[4][3] = {{0}};
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
     drape_predictions list;
@@ -737,10 +720,4 @@ START_TEST(test_kept_predictions)
         ck_assert_double_eq(kept, drape_predicted_stiffness(&contact.gap, &law, weight, v, k < 6 ? 30 : 40));
     }
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("contact", test_predicted, test_kept_predictions, test_triangle, test_segments, test_parallel,
-      test_mollified_away, test_barrier, test_bounded_barrier, test_step_fraction, test_arrival,
-      test_no_gap_is_exempt, test_tree, test_join, test_sort, test_bounds)

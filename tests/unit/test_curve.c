@@ -62,11 +62,10 @@ static void check_points(const drape_points *points, const double *table)
     ck_assert_double_eq(zero.slope, drape_curve_stiffness(table));
 }
 
-START_TEST(it_goes_through_its_points)
+TEST(it_goes_through_its_points)
 {
     for_many(check_points);
 }
-END_TEST
 
 /* The slope is positive everywhere, and Simpson's rule, which is exact for cubics, gives the energy. */
 static void check_convex(const drape_points *points, const double *table)
@@ -86,11 +85,10 @@ static void check_convex(const drape_points *points, const double *table)
     }
 }
 
-START_TEST(its_energy_is_convex)
+TEST(its_energy_is_convex)
 {
     for_many(check_convex);
 }
-END_TEST
 
 /* Central differences of step h have an error of about (h/s)^2, s the distance to the nearest point; near a
  * point the second derivative of the force jumps. */
@@ -117,18 +115,17 @@ static void check_measure(const drape_points *points, const double *table)
     ck_assert_double_eq(zero.dq, 1);
 }
 
-START_TEST(its_measure_has_the_energy_and_its_derivatives)
+TEST(its_measure_has_the_energy_and_its_derivatives)
 {
     for_many(check_measure);
 }
-END_TEST
 
 static double half(double s)
 {
     return s / 2;
 }
 
-START_TEST(straight_lines_are_exact)
+TEST(straight_lines_are_exact)
 {
     const double point[] = {0.01, 3, 0.02, 6, 0.05, 15};
     double table[DRAPE_CURVE_SIZE(3)];
@@ -144,7 +141,3 @@ START_TEST(straight_lines_are_exact)
         }
     }
 }
-END_TEST
-
-SUITE("curve", it_goes_through_its_points, its_energy_is_convex,
-      its_measure_has_the_energy_and_its_derivatives, straight_lines_are_exact)

@@ -20,9 +20,9 @@ static const char sheet[] =
 /* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing
  * elsewhere. Both are differences of sums that are equal except for one addition, so they are exact up to
  * the rounding of the larger sum. */
-START_TEST(force_and_jacobian_are_those_of_a_spring)
+TEST(force_and_jacobian_are_those_of_a_spring)
 {
-    scene h = scene_open(sheet, "", "be");
+    scoped_scene h = scene_open(sheet, "", "be");
     const drape_pattern *pattern = drape_system_pattern(h.sim->system);
     const drape_state *s = drape_sim_state(h.sim);
     const drape_point point = {.x = s->x, .v = s->v, .internal = s->internal};
@@ -53,15 +53,13 @@ START_TEST(force_and_jacobian_are_those_of_a_spring)
         free(values[i]);
         free(g[i]);
     }
-    scene_close(&h);
 }
-END_TEST
 
 /* Setting the spring is work of the host: the numerical loss does not change, and the elastic energy
  * changes by that of the spring, up to the rounding of a few joules. */
-START_TEST(its_work_is_accounted)
+TEST(its_work_is_accounted)
 {
-    scene h = scene_open(sheet, "", "be");
+    scoped_scene h = scene_open(sheet, "", "be");
     const double nowhere[3] = {0};
     double far = 0;
     for (int k = 0; k < 3; k++)
@@ -77,16 +75,14 @@ START_TEST(its_work_is_accounted)
     drape_energy gone = drape_sim_energy(h.sim);
     ck_assert(gone.elastic < moved.elastic);
     assert_below(fabs(gone.numerical - moved.numerical), 1e-14);
-    scene_close(&h);
 }
-END_TEST
 
 /* Several springs add k (x - target) each to g of their nodes, two on one node both, and the sum of the
  * forces is what drape_sim_drag_spring_force returns. A list of one is the spring of
  * drape_sim_set_drag_spring, to the bit of a step; an empty list leaves none. */
-START_TEST(several_springs_add_up)
+TEST(several_springs_add_up)
 {
-    scene h = scene_open(sheet, "", "be"), one = scene_open(sheet, "", "be");
+    scoped_scene h = scene_open(sheet, "", "be"), one = scene_open(sheet, "", "be");
     const int32_t nodes[] = {7, 3, 7, 12, 5};
     const double stiffness[] = {37.5, 12, 8.25, 100, 0},
                  targets[] = {0.4, 0.3, -0.2, 0, 0, 1, -1, 2, 0.5, 0.1, 0.1, 0.1, 9, 9, 9};
@@ -121,9 +117,4 @@ START_TEST(several_springs_add_up)
     ck_assert_int_eq(drape_sim_set_drag_springs(h.sim, 0, NULL, NULL, NULL), DRAPE_OK);
     drape_sim_drag_spring_force(h.sim, force);
     ck_assert_double_eq(force[0], 0);
-    scene_close(&h);
-    scene_close(&one);
 }
-END_TEST
-
-SUITE("drag spring", force_and_jacobian_are_those_of_a_spring, its_work_is_accounted, several_springs_add_up)

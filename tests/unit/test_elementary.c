@@ -89,7 +89,7 @@ static void add_angle(worst *w, double angle)
     add(&w[1], c, cosq(angle), angle, 0);
 }
 
-START_TEST(sine_and_cosine)
+TEST(sine_and_cosine)
 {
     worst w[2] = {0};
     double s, c;
@@ -114,7 +114,6 @@ START_TEST(sine_and_cosine)
         ck_assert(isnan(s) && isnan(c));
     }
 }
-END_TEST
 
 /* ---- Arc tangent ---- */
 
@@ -135,7 +134,7 @@ LANES_DISPATCH static void four(const double *y, const double *x, double *angle)
 }
 
 /* Each lane beside other ones, as atan2 of the C library's special values and of quadmath's. */
-START_TEST(arc_tangent)
+TEST(arc_tangent)
 {
     worst w = {0};
     for (int i = 0; i < samples(); i++) {
@@ -169,11 +168,10 @@ START_TEST(arc_tangent)
             ck_assert_int_eq(signbit(got) != 0, signbit(special[i]) != 0);
         }
 }
-END_TEST
 
 /* ---- Length ---- */
 
-START_TEST(length)
+TEST(length)
 {
     worst w = {0};
     for (int i = 0; i < samples(); i++) {
@@ -192,11 +190,10 @@ START_TEST(length)
         }
     ck_assert(drape_hypot(3, -4) == 5 && drape_hypot(-3e300, 4e300) == 5e300);
 }
-END_TEST
 
 /* ---- Logarithms ---- */
 
-START_TEST(logarithms)
+TEST(logarithms)
 {
     worst w[2] = {0};
     for (int i = 0; i < samples(); i++) {
@@ -218,11 +215,10 @@ START_TEST(logarithms)
     ck_assert(isnan(drape_ln1p(-2)) && isnan(drape_ln1p(NAN)));
     ck_assert(drape_ln1p(0) == 0 && signbit(drape_ln1p(-0.0)));
 }
-END_TEST
 
 /* ---- Powers ---- */
 
-START_TEST(powers)
+TEST(powers)
 {
     worst w = {0};
     for (int i = 0; i < samples(); i++) {
@@ -248,6 +244,3 @@ START_TEST(powers)
                   drape_pow(i * i, 0.5) == i);
     ck_assert(isnan(drape_pow(-1, 2)) && isnan(drape_pow(-0.5, 0.5)));
 }
-END_TEST
-
-SUITE("elementary", sine_and_cosine, arc_tangent, length, logarithms, powers)

@@ -20,20 +20,12 @@ static void parse(drape_context *ctx, const drape_import_ops *import, const char
 {
     const drape_mesh_source source = {"/m/file", "a.obj", NULL};
     *mesh = (drape_mesh){0};
-    const drape_status status = import->read(ctx, &source, text, strlen(text), mesh);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
-}
-
-static drape_context *new_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
+    assert_ok(ctx, import->read(ctx, &source, text, strlen(text), mesh));
 }
 
 static void divides_into(const char *text, int triangles, const int *expected)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     parse(ctx, &drape_import_obj, text, &mesh);
     ck_assert_int_eq(mesh.triangle_count, triangles);
@@ -41,10 +33,9 @@ static void divides_into(const char *text, int triangles, const int *expected)
         ck_assert_msg(mesh.triangle[i] == expected[i], "%s: number %d is %d, not %d", text, i,
                       mesh.triangle[i], expected[i]);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
 
-START_TEST(a_quadrilateral_gets_its_shorter_diagonal)
+TEST(a_quadrilateral_gets_its_shorter_diagonal)
 {
     static const int first[] = {0, 1, 2, 0, 2, 3}, second[] = {0, 1, 3, 1, 2, 3};
     divides_into("v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 1 0\nf 1 2 3 4\n", 2, second);
@@ -56,7 +47,6 @@ START_TEST(a_quadrilateral_gets_its_shorter_diagonal)
     divides_into("v 0 0 0\nv .4 .4 0\nv 1 0 0\nv .4 3 0\nf 1 2 3 4\n", 2, second);
     divides_into("v .4 .4 0\nv 1 0 0\nv .4 3 0\nv 0 0 0\nf 1 2 3 4\n", 2, first);
 }
-END_TEST
 
 /* The area of the triangles of a polygon in the plane, and the largest of the areas that are turned over. */
 static double area_of(const drape_mesh *mesh, double *least)
@@ -79,9 +69,9 @@ static double area_of(const drape_mesh *mesh, double *least)
 
 /* A star of n points with radii 1 and r: its area is n r sin(pi / n), and it is concave at every second
  * corner. Sums of n products have rounding errors below n^2 2^-53 < 1e-11. */
-START_TEST(a_polygon_loses_ears)
+TEST(a_polygon_loses_ears)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     for (int n = 3; n <= 128; n += n < 8 ? 1 : 40) {
         char text[65536];
         size_t used = 0;
@@ -101,12 +91,10 @@ START_TEST(a_polygon_loses_ears)
         ck_assert_int_eq(mesh.faces.count, 1);
         drape_mesh_free(&mesh);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* No such polygon can be divided well, but each becomes as many triangles as it must, and ends. */
-START_TEST(polygons_of_any_kind_are_divided)
+TEST(polygons_of_any_kind_are_divided)
 {
     static const char *const texts[] = {
         "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv .5 2 0\nf 1 2 3 4 5\n",                 /* crosses itself */
@@ -114,7 +102,7 @@ START_TEST(polygons_of_any_kind_are_divided)
         "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4 5\n",                  /* a line */
         "v 1e300 0 0\nv -1e300 0 0\nv 0 1e300 0\nv 0 0 1e300\nv 1 1 1\nf 1 2 3 4 5\n", /* overflows */
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3 1 2\n"};                                   /* nodes repeat */
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         drape_mesh mesh;
         parse(ctx, &drape_import_obj, texts[i], &mesh);
@@ -129,13 +117,11 @@ START_TEST(polygons_of_any_kind_are_divided)
     parse(ctx, &drape_import_obj, text, &mesh);
     ck_assert_int_eq(mesh.triangle_count, 999);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(what_a_simulation_does_not_need_is_not_refused)
+TEST(what_a_simulation_does_not_need_is_not_refused)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     /* coordinates that are not defined, are no numbers, or are missing at a corner */
     parse(ctx, &drape_import_obj,
@@ -171,14 +157,12 @@ START_TEST(what_a_simulation_does_not_need_is_not_refused)
     ck_assert_int_eq(mesh.faces.count, 0);
     ck_assert_ptr_null(mesh.faces.first);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* In OBJ coordinates are often repeated for each corner; a vertex is split only where they differ. */
-START_TEST(equal_coordinates_are_one)
+TEST(equal_coordinates_are_one)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     drape_vertices vertices;
     parse(ctx, &drape_import_obj,
@@ -196,9 +180,7 @@ START_TEST(equal_coordinates_are_one)
         ck_assert_int_eq(vertices.at[i], at[i]);
     drape_arena_free(&arena);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void check_uvs(const drape_mesh *mesh, const double *expected)
 {
@@ -208,10 +190,10 @@ static void check_uvs(const drape_mesh *mesh, const double *expected)
             ck_assert_double_eq(mesh->faces.uv[2 * mesh->faces.uv_of[c] + k], expected[2 * c + k]);
 }
 
-START_TEST(ply_has_them_at_vertices_or_corners)
+TEST(ply_has_them_at_vertices_or_corners)
 {
     static const double uvs[] = {0, .25, 1, 0, 1, 1, 0, 1};
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     static const char *const names[][2] = {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}};
     for (int i = 0; i < 3; i++) {
@@ -242,9 +224,7 @@ START_TEST(ply_has_them_at_vertices_or_corners)
         check_uvs(&mesh, uvs);
         drape_mesh_free(&mesh);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Remedies ---- */
 
@@ -265,9 +245,9 @@ static void open_has_remedy(drape_context *ctx, const char *text, const char *ex
 /* A tetrahedron without a face has a hole; one whose faces have vertices of their own is to be welded, by
  * more than these are apart; and a sheet that was torn apart by more than an edge has nothing to be welded.
  * */
-START_TEST(an_open_mesh_has_a_remedy)
+TEST(an_open_mesh_has_a_remedy)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     open_has_remedy(
         ctx, CORNERS "f 1 3 2\nf 1 2 4\nf 1 4 3\n",
         "; remedy: fill the holes, which have 3 open edges, this one from (1, 0, 0) to (0, 1, 0) m");
@@ -296,8 +276,8 @@ START_TEST(an_open_mesh_has_a_remedy)
         "; remedy: fill the holes, which have 3 open edges, this one from (0, 0, 0) to (1, 0, 0) m");
     drape_context_destroy(&ctx);
     failing_allocator memory = {.fail_at = 1, .stay_broken = true};
-    ctx = new_context();
-    drape_context *none = failing_context(&memory);
+    ctx = make_context();
+    scoped_context *none = failing_context(&memory);
     drape_mesh mesh;
     char remedy[DRAPE_REMEDY_SIZE];
     const drape_mesh_source source = {"/m/file", "a.obj", NULL};
@@ -306,14 +286,11 @@ START_TEST(an_open_mesh_has_a_remedy)
     drape_remedy_open(none, &mesh, remedy);
     ck_assert_ptr_nonnull(strstr(remedy, "fill the holes"));
     drape_mesh_free(&mesh);
-    drape_context_destroy(&none);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_degenerate_triangle_has_a_remedy)
+TEST(a_degenerate_triangle_has_a_remedy)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     char remedy[DRAPE_REMEDY_SIZE];
     parse(ctx, &drape_import_obj, "v 0 0 0\nv 1 0 0\nv 3 0 0\nv 3 0 1e-14\nf 1 2 3\nf 1 3 4\n", &mesh);
@@ -327,9 +304,7 @@ START_TEST(a_degenerate_triangle_has_a_remedy)
     drape_remedy_degenerate(&mesh, mesh.triangle + 3, false, remedy);
     ck_assert_str_eq(remedy, "; remedy: move nodes 2 and 3, which are 1e-14 m apart, away from each other");
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* ---- Round trips ---- */
 
@@ -382,8 +357,7 @@ static void record(scene *s, const frames_folder *f, const char *format)
     snprintf(out, sizeof out, "%s/out", f->path);
     const drape_recorder_def def = {.folder = out, .formats = &format, .format_count = 1};
     drape_recorder *recorder = NULL;
-    drape_status status = drape_recorder_create(s->ctx, s->sim, &def, &recorder);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    assert_ok(s->ctx, drape_recorder_create(s->ctx, s->sim, &def, &recorder));
     ck_assert_int_eq(drape_sim_advance(s->sim, 0.05), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
     drape_recorder_destroy(&recorder);
@@ -391,7 +365,7 @@ static void record(scene *s, const frames_folder *f, const char *format)
 
 /* Frames have the faces that the mesh had: the frame read again, the grid apart, is the mesh but for
  * positions. */
-START_TEST(obj_frames_have_the_faces_of_the_mesh)
+TEST(obj_frames_have_the_faces_of_the_mesh)
 {
     frames_folder f = frames_folder_make();
     write_tube(&f, "tube.obj");
@@ -423,7 +397,6 @@ START_TEST(obj_frames_have_the_faces_of_the_mesh)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 static uint32_t word_at(const char *data, size_t at)
 {
@@ -488,7 +461,7 @@ static size_t place(const glb *g, json_int_t accessor, size_t width, json_int_t 
 
 /* One primitive a material with its name, all corners with the positions and coordinates of the mesh, v
  * downwards; the nodes of the seam have two vertices, and those of the lid one more. */
-START_TEST(glb_has_texture_coordinates_and_materials)
+TEST(glb_has_texture_coordinates_and_materials)
 {
     frames_folder f = frames_folder_make();
     write_tube(&f, "tube.obj");
@@ -538,10 +511,9 @@ START_TEST(glb_has_texture_coordinates_and_materials)
     scene_close(&s);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Each failed allocation is reported, by the importer and where vertices are split, and none leaks. */
-START_TEST(each_allocation_may_fail)
+TEST(each_allocation_may_fail)
 {
     frames_folder f = frames_folder_make();
     write_tube(&f, "tube.obj");
@@ -564,10 +536,3 @@ START_TEST(each_allocation_may_fail)
     }
     frames_folder_remove(&f);
 }
-END_TEST
-
-SUITE("faces", a_quadrilateral_gets_its_shorter_diagonal, a_polygon_loses_ears,
-      polygons_of_any_kind_are_divided, what_a_simulation_does_not_need_is_not_refused,
-      equal_coordinates_are_one, ply_has_them_at_vertices_or_corners, an_open_mesh_has_a_remedy,
-      a_degenerate_triangle_has_a_remedy, obj_frames_have_the_faces_of_the_mesh,
-      glb_has_texture_coordinates_and_materials, each_allocation_may_fail)

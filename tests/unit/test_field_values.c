@@ -27,9 +27,9 @@ static drape_status measure(scene *h, const char *name, const double *x)
 /* Under x -> (1.04 x, 0.97 z), sheared and rotated, the largest principal strain is that of the matrix: for
  * F = R [a s; 0 b] it is ((a + b)^2 + s^2)^1/2 / 2 + ((a - b)^2 + s^2)^1/2 / 2 - 1 in every triangle, and
  * so at every node, up to the rounding of squares of numbers near 1. */
-START_TEST(strain_of_a_homogeneous_stretch_is_exact)
+TEST(strain_of_a_homogeneous_stretch_is_exact)
 {
-    scene h = scene_open(sheet, "be", "");
+    scoped_scene h = scene_open(sheet, "be", "");
     const double a = 1.04, b = 0.97, s = 0.03, turn = 0.7;
     double want = 0.5 * (hypot(a + b, s) + hypot(a - b, s)) - 1, x[3 * NODES], worst = 0;
     for (int i = 0; i < NODES; i++) {
@@ -43,15 +43,13 @@ START_TEST(strain_of_a_homogeneous_stretch_is_exact)
     for (int i = 0; i < NODES; i++)
         worst = fmax(worst, fabs(values[i] - want));
     assert_below(worst, 1e-14);
-    scene_close(&h);
 }
-END_TEST
 
 /* Density times area sums to the elastic energy of the sim, and no density is negative. Sums of 24 and of
  * some hundred positive numbers in two orders agree to 1e-13. */
-START_TEST(energy_density_sums_to_the_energy)
+TEST(energy_density_sums_to_the_energy)
 {
-    scene h = scene_open(sheet, "be", "");
+    scoped_scene h = scene_open(sheet, "be", "");
     double sum = 0;
     ck_assert_int_eq(drape_sim_advance(h.sim, 0.2), DRAPE_OK);
     ck_assert_int_eq(measure(&h, "energy", drape_sim_positions(h.sim)), DRAPE_OK);
@@ -62,13 +60,11 @@ START_TEST(energy_density_sums_to_the_energy)
     double elastic = drape_sim_energy(h.sim).elastic;
     ck_assert(elastic > 1e-6);
     assert_below(fabs(sum - elastic), 1e-13 * elastic);
-    scene_close(&h);
 }
-END_TEST
 
-START_TEST(velocity_is_the_speed)
+TEST(velocity_is_the_speed)
 {
-    scene h = scene_open(sheet, "be", "");
+    scoped_scene h = scene_open(sheet, "be", "");
     ck_assert_int_eq(drape_sim_advance(h.sim, 0.1), DRAPE_OK);
     ck_assert_int_eq(measure(&h, "velocity", drape_sim_positions(h.sim)), DRAPE_OK);
     for (int i = 0; i < NODES; i++) {
@@ -76,9 +72,7 @@ START_TEST(velocity_is_the_speed)
         ck_assert(fabs(values[i] - sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])) <= 1e-16 * values[i]);
     }
     ck_assert(values[0] == 0 && values[NODES - 1] > 0.1);
-    scene_close(&h);
 }
-END_TEST
 
 static drape_status keep_residual(void *user, const drape_event *event)
 {
@@ -89,9 +83,9 @@ static drape_status keep_residual(void *user, const drape_event *event)
 
 /* The step log has the largest component; a node's vector is between that and sqrt(3) of it. An integrator
  * that solves no equations reports that there is no residual. */
-START_TEST(residual_is_that_of_the_last_step)
+TEST(residual_is_that_of_the_last_step)
 {
-    scene h = scene_open(sheet, "be", "");
+    scoped_scene h = scene_open(sheet, "be", "");
     double logged = -1, largest = 0;
     ck_assert_int_eq(drape_sim_observe(h.sim, keep_residual, &logged), DRAPE_OK);
     ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_OK);
@@ -107,20 +101,19 @@ START_TEST(residual_is_that_of_the_last_step)
     ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_E_ARGUMENT);
     ck_assert_str_eq(drape_context_message(h.ctx),
                      "residual: the integrator \"verlet\" does not solve its steps by Newton's method");
-    scene_close(&h);
 }
-END_TEST
 
 /* The floor carries the sheet: contact forces on it are vertical, so their sizes add up to the weight of
  * the free nodes. The share that the pin takes by bending, and the motion left after 3 s, are below a
  * hundredth of it. */
-START_TEST(contact_forces_carry_the_weight)
+TEST(contact_forces_carry_the_weight)
 {
-    scene h = scene_open(sheet, "be",
-                         ", 'colliders': [{'type': 'plane', 'point': [0, -0.002, 0], 'normal': [0, 1, 0]}],"
-                         " 'contact': {'distance': 0.005}");
+    scoped_scene h =
+        scene_open(sheet, "be",
+                   ", 'colliders': [{'type': 'plane', 'point': [0, -0.002, 0], 'normal': [0, 1, 0]}],"
+                   " 'contact': {'distance': 0.005}");
     double force = 0, weight = 0;
-    ck_assert_msg(drape_sim_advance(h.sim, 3) == DRAPE_OK, "%s", drape_context_message(h.ctx));
+    assert_ok(h.ctx, drape_sim_advance(h.sim, 3));
     ck_assert_int_eq(measure(&h, "contact", drape_sim_positions(h.sim)), DRAPE_OK);
     for (int i = 1; i < NODES; i++) { /* node 0 is pinned near the floor */
         force += values[i];
@@ -133,9 +126,4 @@ START_TEST(contact_forces_carry_the_weight)
                    ", 'colliders': [{'type': 'plane', 'point': [0, -1, 0], 'normal': [0, 1, 0]}]");
     ck_assert_int_eq(measure(&h, "contact", drape_sim_positions(h.sim)), DRAPE_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(drape_context_message(h.ctx), "resolves contact by moving nodes"));
-    scene_close(&h);
 }
-END_TEST
-
-SUITE("field_values", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
-      velocity_is_the_speed, residual_is_that_of_the_last_step, contact_forces_carry_the_weight)

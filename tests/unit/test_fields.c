@@ -10,7 +10,7 @@
 
 /* Elements of two and of four nodes, a law, and a barrier. Sums of positive numbers in two orders: their
  * difference is at most the number of nodes times the rounding. */
-START_TEST(energy_density_adds_up_to_the_elastic_energy)
+TEST(energy_density_adds_up_to_the_elastic_energy)
 {
     static const char *const terms[] = {
         "'stretch.edge'", "'stretch.edge', 'bend.hinge'",
@@ -19,7 +19,7 @@ START_TEST(energy_density_adds_up_to_the_elastic_energy)
         "'stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 1e-3}, {'type': 'limit.strain', "
         "'limit': 0.1}"};
     for (int i = 0; i < 4; i++) {
-        scene s = scene_open(SHEET, terms[i], -9.81, 60.0);
+        scoped_scene s = scene_open(SHEET, terms[i], -9.81, 60.0);
         double density[35], sum = 0;
         scene_advance(&s, 0.2);
         drape_sim_energy_density(s.sim, density);
@@ -30,10 +30,8 @@ START_TEST(energy_density_adds_up_to_the_elastic_energy)
         double elastic = drape_sim_energy(s.sim).elastic;
         ck_assert(elastic > 0);
         ck_assert_double_eq_tol(sum, elastic, 100 * DBL_EPSILON * elastic);
-        scene_close(&s);
     }
 }
-END_TEST
 
 typedef struct falling {
     int frames, between;
@@ -58,10 +56,10 @@ static drape_status check_fall(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-START_TEST(frames_have_velocities)
+TEST(frames_have_velocities)
 {
     falling f = {0};
-    scene s =
+    scoped_scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 5, 'width': 0.6,"
                    " 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
                    " 'terms': []}], 'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 1,"
@@ -71,8 +69,4 @@ START_TEST(frames_have_velocities)
     scene_advance(&s, 0.5);
     ck_assert_int_eq(f.frames, 39);
     ck_assert_int_gt(f.between, 30);
-    scene_close(&s);
 }
-END_TEST
-
-SUITE("fields", energy_density_adds_up_to_the_elastic_energy, frames_have_velocities)

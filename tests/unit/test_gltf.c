@@ -178,6 +178,8 @@ static void close_it(reading *r)
     drape_context_destroy(&r->ctx);
 }
 
+#define scoped_reading SCOPED(close_it) reading
+
 static void assert_point(const reading *r, int frame, int node, double x, double y, double z)
 {
     const double *at = r->frames.x + 3 * ((size_t)frame * (size_t)r->frames.node_count + (size_t)node);
@@ -190,13 +192,13 @@ static void assert_point(const reading *r, int frame, int node, double x, double
 /* Points are 2 x, raised by t - 1, and turned about z by -90 degrees (t - 1)/2: the quaternion of the
  * second key has another sign and length, and between them the smaller angle counts. The six points of the
  * file are four. */
-START_TEST(nodes_move)
+TEST(nodes_move)
 {
     const frames_folder f = frames_folder_make();
     const glb g = make_square();
     write_glb(&f, &g);
     reading r = read_it(&f, 2);
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 5);
     ck_assert_int_eq(r.mesh.node_count, 4);
     ck_assert_int_eq(r.mesh.triangle_count, 2);
@@ -214,24 +216,23 @@ START_TEST(nodes_move)
     replace(&still, "'animations'", "'extras'");
     write_glb(&f, &still);
     r = read_it(&f, 2);
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 1);
     ck_assert_double_eq(r.frames.time[0], 10);
     assert_point(&r, 0, 2, 2, 2, 0);
     close_it(&r);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* The node of a skinned mesh does not move it. At half of the spline the weight is 1/2 + 1/8 of the
  * tangent. */
-START_TEST(skins_and_morph_targets_move)
+TEST(skins_and_morph_targets_move)
 {
     const frames_folder f = frames_folder_make();
     const glb g = make_skin();
     write_glb(&f, &g);
     reading r = read_it(&f, 2);
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 3);
     ck_assert_int_eq(r.mesh.node_count, 4);
     assert_point(&r, 0, 1, 2, 0, 0);
@@ -246,11 +247,10 @@ START_TEST(skins_and_morph_targets_move)
     close_it(&r);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* A node that mirrors its mesh turns the triangles, of a skin the joints that move it do; a node above
  * counts as well. Two mirrors are none, and a mirror that an animation makes is refused. */
-START_TEST(mirrors_turn_triangles)
+TEST(mirrors_turn_triangles)
 {
     static const int32_t as_given[] = {0, 1, 2, 0, 2, 3}, turned[] = {0, 2, 1, 0, 3, 2};
     static const struct {
@@ -269,11 +269,10 @@ START_TEST(mirrors_turn_triangles)
         glb g = cases[i].skin ? make_skin() : make_square();
         replace(&g, cases[i].from, cases[i].to);
         write_glb(&f, &g);
-        reading r = read_it(&f, 2);
-        ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+        scoped_reading r = read_it(&f, 2);
+        assert_ok(r.ctx, r.status);
         ck_assert_int_eq(r.mesh.triangle_count, 2);
         ck_assert_mem_eq(r.mesh.triangle, cases[i].triangle, sizeof as_given);
-        close_it(&r);
     }
     glb g = make_square();
     replace(&g, "'path': 'translation'", "'path': 'scale'");
@@ -287,10 +286,9 @@ START_TEST(mirrors_turn_triangles)
     close_it(&r);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Numbers of the buffer that are not finite are named. */
-START_TEST(values_are_finite)
+TEST(values_are_finite)
 {
     static const struct {
         bool skin;
@@ -307,17 +305,15 @@ START_TEST(values_are_finite)
         glb g = cases[i].skin ? make_skin() : make_square();
         memcpy(g.bytes + cases[i].at, &nan, sizeof nan);
         write_glb(&f, &g);
-        reading r = read_it(&f, 2);
+        scoped_reading r = read_it(&f, 2);
         ck_assert_int_eq(r.status, DRAPE_E_PARSE);
         ck_assert_msg(strstr(drape_context_message(r.ctx), cases[i].message), "%s\nfor %s",
                       drape_context_message(r.ctx), cases[i].message);
-        close_it(&r);
     }
     frames_folder_remove(&f);
 }
-END_TEST
 
-START_TEST(faults_name_the_part)
+TEST(faults_name_the_part)
 {
     static const struct {
         bool skin;
@@ -397,11 +393,10 @@ START_TEST(faults_name_the_part)
             g.bytes[290] = 9;
         replace(&g, cases[i].from, cases[i].to);
         write_glb(&f, &g);
-        reading r = read_it(&f, 2);
+        scoped_reading r = read_it(&f, 2);
         ck_assert_msg(r.status == DRAPE_E_PARSE, "%s: %d", cases[i].message, r.status);
         ck_assert_msg(strstr(drape_context_message(r.ctx), cases[i].message), "%s\nfor %s",
                       drape_context_message(r.ctx), cases[i].message);
-        close_it(&r);
     }
     glb g = make_square();
     write_glb(&f, &g);
@@ -412,11 +407,10 @@ START_TEST(faults_name_the_part)
     close_it(&r);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Whatever a byte is, and wherever the file ends, reading ends with a status; under the sanitizers nothing
  * is read outside of it. */
-START_TEST(hostile_bytes_are_read_or_refused)
+TEST(hostile_bytes_are_read_or_refused)
 {
     const frames_folder f = frames_folder_make();
     static const char values[] = {0, '9', '-', (char)255};
@@ -426,9 +420,8 @@ START_TEST(hostile_bytes_are_read_or_refused)
         const size_t size = pack(&g, bytes);
         for (size_t length = 0; length < size; length += 7) {
             write_bytes(&f, bytes, length);
-            reading r = read_it(&f, 2);
+            scoped_reading r = read_it(&f, 2);
             ck_assert_int_eq(r.status, DRAPE_E_PARSE);
-            close_it(&r);
         }
         for (size_t i = 0; i < size; i++) {
             const char kept = bytes[i];
@@ -442,7 +435,3 @@ START_TEST(hostile_bytes_are_read_or_refused)
     }
     frames_folder_remove(&f);
 }
-END_TEST
-
-SUITE("gltf", nodes_move, skins_and_morph_targets_move, mirrors_turn_triangles, values_are_finite,
-      faults_name_the_part, hostile_bytes_are_read_or_refused)

@@ -16,34 +16,25 @@ extern const drape_import_ops drape_import_obj, drape_import_ply;
 
 static const drape_mesh_source obj_source = {"/m/file", "bad.obj"}, ply_source = {"/m/file", "bad.ply"};
 
-static drape_context *new_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 /* Reads from a copy of exactly size + 1 bytes, so that AddressSanitizer detects a read beyond it. */
 static drape_status read_bytes(drape_context *ctx, const drape_import_ops *import, const void *data,
                                size_t size, drape_mesh *mesh)
 {
-    char *copy = malloc(size + 1);
+    scoped_memory char *copy = malloc(size + 1);
     memcpy(copy, data, size);
     copy[size] = 0;
     *mesh = (drape_mesh){0};
     const drape_mesh_source *source = import == &drape_import_obj ? &obj_source : &ply_source;
     const drape_status status = import->read(ctx, source, copy, size, mesh);
-    free(copy);
     return status;
 }
 
 static void assert_read(const drape_import_ops *import, const void *data, size_t size, int32_t nodes,
                         const double *x, int32_t triangles, const int32_t *triangle)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
-    const drape_status status = read_bytes(ctx, import, data, size, &mesh);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    assert_ok(ctx, read_bytes(ctx, import, data, size, &mesh));
     ck_assert_int_eq(mesh.node_count, nodes);
     ck_assert_int_eq(mesh.triangle_count, triangles);
     for (int32_t i = 0; i < 3 * nodes; i++)
@@ -51,17 +42,15 @@ static void assert_read(const drape_import_ops *import, const void *data, size_t
     for (int32_t i = 0; i < 3 * triangles; i++)
         ck_assert_int_eq(mesh.triangle[i], triangle[i]);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
 
 static void assert_refused(const drape_import_ops *import, const void *data, size_t size, const char *message)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     ck_assert_int_eq(read_bytes(ctx, import, data, size, &mesh), DRAPE_E_PARSE);
     ck_assert_str_eq(drape_context_message(ctx), message);
     drape_mesh_free(&mesh);
-    drape_context_destroy(&ctx);
 }
 
 static void obj_refused(const char *text, const char *message)
@@ -90,7 +79,7 @@ static void ply_is_square(const char *text)
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
-START_TEST(obj_corners_of_every_form)
+TEST(obj_corners_of_every_form)
 {
     obj_is_square(SQUARE "f 1 2 3\nf 1 3 4\n");
     obj_is_square(SQUARE "f 1 2 3 4\n");
@@ -103,9 +92,8 @@ START_TEST(obj_corners_of_every_form)
     obj_is_square("f 1 2 3 4\n" SQUARE); /* a face before its nodes */
     obj_is_square("v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nf 1 -2 -1\n");
 }
-END_TEST
 
-START_TEST(obj_lines_of_every_form)
+TEST(obj_lines_of_every_form)
 {
     obj_is_square("v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 3 4\r\n");
     obj_is_square("v 0 0 0\rv 1 0 0\rv 1 1 0\rv 0 1 0\rf 1 2 3 4");
@@ -116,18 +104,16 @@ START_TEST(obj_lines_of_every_form)
     obj_is_square("# v 9 9 9 \\\nv 0 0 0\nmtllib a b.mtl\no sheet\nv 1 0 0\nvt 0 0\nvn 0 0 1\nvp 1\n"
                   "g a b\nv 1 1 0\ns off\nusemtl cloth\nv 0 1 0\nl 1 2\np 1\nf 1 2 3 \\\n\\\n4\n");
 }
-END_TEST
 
-START_TEST(obj_numbers_of_every_form)
+TEST(obj_numbers_of_every_form)
 {
     static const double x[] = {1e-3, -2.5, 0.25, 3e8, .5, -0.0, 12345678.9012345, 4, 1e-320};
     static const int32_t triangle[] = {0, 1, 2};
     const char *text = "v 1e-3 -2.5 +.25\nv 3E+8 .5 -0\nv 12345678.9012345 4. 1e-320\nf 1 2 3\n";
     assert_read(&drape_import_obj, text, strlen(text), 3, x, 1, triangle);
 }
-END_TEST
 
-START_TEST(obj_faults)
+TEST(obj_faults)
 {
     obj_refused("v 0 0\n", "/m/file: bad.obj:1: a node with 2 coordinates; it needs x, y and z");
     obj_refused("\n\nv\n", "/m/file: bad.obj:3: a node with 0 coordinates; it needs x, y and z");
@@ -160,14 +146,13 @@ START_TEST(obj_faults)
         obj_refused(text, message);
     }
 }
-END_TEST
 
 #define VERTICES    "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 #define FACES       "element face 2\nproperty list uchar int vertex_indices\n"
 #define ASCII       "ply\nformat ascii 1.0\n"
 #define SQUARE_ROWS "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
 
-START_TEST(ply_ascii)
+TEST(ply_ascii)
 {
     ply_is_square(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3\n");
     ply_is_square(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS
@@ -189,9 +174,8 @@ START_TEST(ply_ascii)
         "property uchar alpha\nelement edge 1\nproperty int a\nend_header\n"
         "0.5 3 1 2 3\n\n\n255 4 0 1 2 3 2 .1 .2\n9 0 0 0 1\n9 0 0 1 1\n\n9 0 1 1 1\n9 0 1 0 1\n5\n");
 }
-END_TEST
 
-START_TEST(ply_header_faults)
+TEST(ply_header_faults)
 {
     ply_refused("", "/m/file: bad.ply:1: the first line must be \"ply\"");
     ply_refused("plY\n", "/m/file: bad.ply:1: the first line must be \"ply\"");
@@ -240,9 +224,8 @@ START_TEST(ply_header_faults)
     ply_refused(ASCII FACES "element vertex 1\nproperty float x\nproperty list uchar float y\nend_header\n",
                 "/m/file: bad.ply:8: element vertex has no property y");
 }
-END_TEST
 
-START_TEST(ply_header_limits)
+TEST(ply_header_limits)
 {
     char text[20000];
     size_t used = (size_t)snprintf(text, sizeof text, ASCII);
@@ -254,9 +237,8 @@ START_TEST(ply_header_limits)
         used += (size_t)snprintf(text + used, sizeof text - used, "property float p%d\n", i);
     ply_refused(text, "/m/file: bad.ply:260: more than 256 properties");
 }
-END_TEST
 
-START_TEST(ply_ascii_data_faults)
+TEST(ply_ascii_data_faults)
 {
     ply_refused(ASCII VERTICES FACES "end_header\n0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n",
                 "/m/file: bad.ply:10: the line ends before all values of its vertex");
@@ -287,9 +269,8 @@ START_TEST(ply_ascii_data_faults)
     ply_refused(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n",
                 "/m/file: bad.ply:15: the file ends before face 1 of 2");
 }
-END_TEST
 
-START_TEST(ply_counts_beyond_the_file_take_no_memory)
+TEST(ply_counts_beyond_the_file_take_no_memory)
 {
     failing_allocator memory = {0};
     drape_context *ctx = failing_context(&memory);
@@ -310,7 +291,6 @@ START_TEST(ply_counts_beyond_the_file_take_no_memory)
     drape_context_destroy(&ctx);
     ck_assert_int_eq(memory.live, 0);
 }
-END_TEST
 
 typedef struct bytes {
     unsigned char data[2000];
@@ -386,7 +366,7 @@ static bytes binary_square(bool big_endian, const char *line_end)
     return out;
 }
 
-START_TEST(ply_binary)
+TEST(ply_binary)
 {
     static const char *const line_ends[] = {"\n", "\r\n"};
     for (int i = 0; i < 4; i++) {
@@ -394,9 +374,8 @@ START_TEST(ply_binary)
         assert_read(&drape_import_ply, data.data, data.size, 4, corners, 2, fan);
     }
 }
-END_TEST
 
-START_TEST(ply_binary_integers_keep_their_sign)
+TEST(ply_binary_integers_keep_their_sign)
 {
     static const char *const names[] = {"char", "uchar", "short", "ushort", "int", "uint"};
     static const size_t sizes[] = {1, 1, 2, 2, 4, 4};
@@ -417,7 +396,6 @@ START_TEST(ply_binary_integers_keep_their_sign)
         assert_read(&drape_import_ply, out.data, out.size, 1, x, 0, NULL);
     }
 }
-END_TEST
 
 static bytes small_binary(void)
 {
@@ -433,7 +411,7 @@ static bytes small_binary(void)
     return out;
 }
 
-START_TEST(ply_binary_faults)
+TEST(ply_binary_faults)
 {
     bytes data = small_binary();
     assert_read(&drape_import_ply, data.data, data.size, 4, corners, 2, fan);
@@ -453,7 +431,6 @@ START_TEST(ply_binary_faults)
     assert_refused(&drape_import_ply, data.data, data.size - 40,
                    "/m/file: bad.ply:3: 4 items of vertex; the 34 bytes after the header hold at most 2");
 }
-END_TEST
 
 static const char rich_obj[] =
     "# sheet\nv 0 0 0\nv 1 0 0 \\\n 1\nv 1 1 0\r\nv 0 1 0\nvt 0 0\nf 1/1/1 2//2 -2 "
@@ -464,7 +441,7 @@ static const char rich_obj[] =
 static void change_every_byte(const drape_import_ops *import, const void *data, size_t size)
 {
     static const char replacements[] = {0, '\n', '\r', ' ', '-', '9', '/', '\\', '#', 'e', (char)0xFF, 1};
-    char *copy = malloc(size);
+    scoped_memory char *copy = malloc(size);
     for (size_t at = 0; at < size; at++)
         for (size_t k = 0; k < sizeof replacements; k++) {
             failing_allocator memory = {0};
@@ -488,10 +465,9 @@ static void change_every_byte(const drape_import_ops *import, const void *data, 
             drape_context_destroy(&ctx);
             ck_assert_int_eq(memory.live, 0);
         }
-    free(copy);
 }
 
-START_TEST(every_byte_changed)
+TEST(every_byte_changed)
 {
     static const char text[] = ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3\n";
     const bytes binary = binary_square(false, "\n"), small = small_binary();
@@ -500,7 +476,6 @@ START_TEST(every_byte_changed)
     change_every_byte(&drape_import_ply, binary.data, binary.size);
     change_every_byte(&drape_import_ply, small.data, small.size);
 }
-END_TEST
 
 typedef struct folder {
     char path[64];
@@ -541,12 +516,12 @@ static drape_status make_file(drape_context *ctx, const folder *f, const char *n
     return drape_mesh_make(ctx, "/m", &def, f->path, mesh);
 }
 
-START_TEST(files_by_ending_relative_and_absolute)
+TEST(files_by_ending_relative_and_absolute)
 {
     const folder f = new_folder();
     const char *obj = SQUARE "f 1 2 3 4\n";
     const bytes ply = small_binary();
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     write_file(&f, "a.obj", obj, strlen(obj));
     write_file(&f, "b.x.PLY", ply.data, ply.size);
     char absolute[200];
@@ -554,8 +529,7 @@ START_TEST(files_by_ending_relative_and_absolute)
     const char *const names[] = {"a.obj", "b.x.PLY", "./a.obj", absolute};
     for (size_t i = 0; i < COUNT(names); i++) {
         drape_mesh mesh;
-        const drape_status status = make_file(ctx, &f, names[i], &mesh);
-        ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+        assert_ok(ctx, make_file(ctx, &f, names[i], &mesh));
         ck_assert_int_eq(mesh.hinge_count, 1);
         ck_assert_int_eq(mesh.rows, 0);
         drape_mesh_free(&mesh);
@@ -567,21 +541,18 @@ START_TEST(files_by_ending_relative_and_absolute)
     remove_file(&f, "a.obj");
     remove_file(&f, "b.x.PLY");
     rmdir(f.path);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 static void file_refused(const folder *f, const char *name, drape_status status, const char *message)
 {
-    drape_context *ctx = new_context();
+    scoped_context *ctx = make_context();
     drape_mesh mesh;
     ck_assert_int_eq(make_file(ctx, f, name, &mesh), status);
     ck_assert_str_eq(drape_context_message(ctx), message);
     ck_assert_ptr_null(mesh.x);
-    drape_context_destroy(&ctx);
 }
 
-START_TEST(file_faults)
+TEST(file_faults)
 {
     const folder f = new_folder();
     char message[300], path[200];
@@ -611,9 +582,8 @@ START_TEST(file_faults)
     remove_file(&f, "large.obj");
     rmdir(f.path);
 }
-END_TEST
 
-START_TEST(content_faults_name_the_file)
+TEST(content_faults_name_the_file)
 {
     const folder f = new_folder();
     static const struct {
@@ -639,7 +609,6 @@ START_TEST(content_faults_name_the_file)
     remove_file(&f, "bad.obj");
     rmdir(f.path);
 }
-END_TEST
 
 static void fail_every_allocation(const folder *f, const char *name)
 {
@@ -659,7 +628,7 @@ static void fail_every_allocation(const folder *f, const char *name)
     ck_assert_int_ge(failures, 17);
 }
 
-START_TEST(every_failed_allocation_is_reported_and_none_leaks)
+TEST(every_failed_allocation_is_reported_and_none_leaks)
 {
     const folder f = new_folder();
     const bytes ply = small_binary();
@@ -671,10 +640,3 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
     remove_file(&f, "a.ply");
     rmdir(f.path);
 }
-END_TEST
-
-SUITE("import", obj_corners_of_every_form, obj_lines_of_every_form, obj_numbers_of_every_form, obj_faults,
-      ply_ascii, ply_header_faults, ply_header_limits, ply_ascii_data_faults,
-      ply_counts_beyond_the_file_take_no_memory, ply_binary, ply_binary_integers_keep_their_sign,
-      ply_binary_faults, every_byte_changed, files_by_ending_relative_and_absolute, file_faults,
-      content_faults_name_the_file, every_failed_allocation_is_reported_and_none_leaks)

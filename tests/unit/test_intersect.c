@@ -15,9 +15,8 @@ static drape_model *crossed_squares(drape_context *ctx, double shift)
     static const drape_setting material[] = {
         {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
     drape_cloth_def cloths[2];
-    drape_scene_def scene;
+    drape_scene_def scene = scene_def();
     drape_model *model = NULL;
-    drape_scene_def_init(&scene, sizeof scene);
     for (int c = 0; c < 2; c++) {
         drape_cloth_def_init(&cloths[c], sizeof cloths[c]);
         cloths[c].mesh.grid = (drape_entry_def){"square", grid, 4};
@@ -70,12 +69,12 @@ static int64_t count_all_pairs(const drape_model *m, const double *x)
     return count;
 }
 
-START_TEST(crossing_sheets_are_counted_as_by_all_pairs)
+TEST(crossing_sheets_are_counted_as_by_all_pairs)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_intersections found;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    drape_model *model = crossed_squares(ctx, -0.4629);
+    scoped_model *model = crossed_squares(ctx, -0.4629);
     double *x = model->rest;
     int64_t expected = count_all_pairs(model, x);
     ck_assert_int_gt(expected, 5); /* 4 cells wide: at least one edge a cell */
@@ -91,27 +90,22 @@ START_TEST(crossing_sheets_are_counted_as_by_all_pairs)
         ck_assert_int_eq(drape_find_intersections(ctx, model, x, &found), DRAPE_OK);
         ck_assert_int_eq(found.count, count_all_pairs(model, x));
     }
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* In a flat sheet nothing crosses, whatever its rotation: its volumes are rounding errors. */
-START_TEST(a_flat_sheet_has_none)
+TEST(a_flat_sheet_has_none)
 {
     static const drape_setting grid[] = {
         {"columns", 17, NULL}, {"rows", 13, NULL}, {"width", 1.3, NULL}, {"height", 0.7, NULL}};
     static const drape_setting material[] = {
         {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
     for (int k = 0; k < 36; k++) {
-        drape_context *ctx = NULL;
-        drape_model *model = NULL;
-        drape_cloth_def cloth;
-        drape_scene_def scene;
+        scoped_context *ctx = NULL;
+        scoped_model *model = NULL;
+        drape_cloth_def cloth = cloth_def();
+        drape_scene_def scene = scene_def();
         drape_intersections found;
         ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-        drape_cloth_def_init(&cloth, sizeof cloth);
-        drape_scene_def_init(&scene, sizeof scene);
         cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
         cloth.material = material;
         cloth.material_count = 3;
@@ -123,16 +117,13 @@ START_TEST(a_flat_sheet_has_none)
         ck_assert_int_eq(drape_model_create(ctx, &scene, &model), DRAPE_OK);
         ck_assert_int_eq(drape_find_intersections(ctx, model, model->rest, &found), DRAPE_OK);
         ck_assert_int_eq(found.count, 0);
-        drape_model_destroy(&model);
-        drape_context_destroy(&ctx);
     }
 }
-END_TEST
 
 /* Points of a grid of steps of 2^-12 around (1, 1, 1) 2^20, far beyond what doubles resolve in a volume: d
  * = a + i (b - a) + j (c - a) lies in the plane exactly, and one step along z beside it on the side of the
  * normal's z. All sums are integers below 2^52 steps, so the points are exact. */
-START_TEST(signs_are_exact)
+TEST(signs_are_exact)
 {
     const double step = 1.0 / 4096, origin = 1048576;
     uint64_t random = 7;
@@ -160,7 +151,6 @@ START_TEST(signs_are_exact)
     for (int k = 0; k < 3; k++)
         ck_assert_int_gt(sides[k], 5000);
 }
-END_TEST
 
 static void count_visits(void *user, int32_t edge, int32_t triangle)
 {
@@ -171,11 +161,11 @@ static void count_visits(void *user, int32_t edge, int32_t triangle)
 
 /* An edge through the common side of two triangles passes through both, from either side; one that ends on
  * the plane passes through none. */
-START_TEST(sides_belong_to_triangles)
+TEST(sides_belong_to_triangles)
 {
     const double x[] = {0, 0, 0, 1, 0, 0, 1, 0, 1, 0, 0, 1, 0.5, -1, 0.5, 0.5, 1, 0.5, 0.5, 0, 0.5};
     const int32_t triangle[] = {0, 1, 2, 0, 2, 3}, edges[][2] = {{4, 5}, {5, 4}, {4, 6}, {6, 5}};
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     for (int i = 0; i < 4; i++) {
         int64_t count = 0;
@@ -184,9 +174,4 @@ START_TEST(sides_belong_to_triangles)
         ck_assert_int_eq(drape_intersect(ctx, &surface, &surface, count_visits, &count), DRAPE_OK);
         ck_assert_int_eq(count, i < 2 ? 2 : 0);
     }
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, a_flat_sheet_has_none, signs_are_exact,
-      sides_belong_to_triangles)

@@ -73,8 +73,7 @@ static void make_model(world *w)
         {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
     const drape_setting be[] = {{"dt", DT, NULL}};
     const drape_entry_def term = {"stretch.edge", NULL, 0};
-    drape_pin_def pin;
-    drape_pin_def_init(&pin, sizeof pin);
+    drape_pin_def pin = pin_def();
     pin.corner = "top-left";
     drape_cloth_def cloth[2];
     for (int i = 0; i < 2; i++) {
@@ -89,14 +88,12 @@ static void make_model(world *w)
         cloth[i].pins = &pin;
         cloth[i].pin_count = 1;
     }
-    drape_scene_def scene;
-    drape_scene_def_init(&scene, sizeof scene);
+    drape_scene_def scene = scene_def();
     scene.cloths = cloth;
     scene.cloth_count = 2;
     scene.integrator = (drape_entry_def){"be", be, 1};
     scene.frame_rate = RATE;
-    drape_status status = drape_model_create(w->ctx, &scene, &w->model);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+    assert_ok(w->ctx, drape_model_create(w->ctx, &scene, &w->model));
 }
 
 static void set_up(world *w)
@@ -139,6 +136,8 @@ static void tear_down(world *w)
     remove_all(w->folder);
 }
 
+#define scoped_world SCOPED(tear_down) world
+
 static drape_status record(world *w, drape_context *ctx, const char *format, drape_recorder **out)
 {
     const char *const formats[] = {format};
@@ -159,9 +158,9 @@ static void run(world *w, const char *format, double t_end)
 {
     drape_recorder *recorder;
     drape_status status = record(w, w->ctx, format, &recorder);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+    assert_ok(w->ctx, status);
     status = drape_sim_advance(w->sim, t_end);
-    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+    assert_ok(w->ctx, status);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
     ck_assert(drape_recorder_done(recorder).seconds > 0);
     drape_recorder_destroy(&recorder);
@@ -232,9 +231,9 @@ static size_t file_size(const char *folder, const char *name)
 
 /* ---- Frames */
 
-START_TEST(npy_is_exact)
+TEST(npy_is_exact)
 {
-    world w;
+    scoped_world w;
     char *data;
     set_up(&w);
     run(&w, "npy", 0.11);
@@ -251,13 +250,11 @@ START_TEST(npy_is_exact)
     ck_assert_int_ne(memcmp(w.seen.x[0], w.seen.x[1], FRAME_SIZE), 0);
     ck_assert_int_eq(count_files(w.out, ".part"), 0);
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(the_last_frame_comes_once)
+TEST(the_last_frame_comes_once)
 {
-    world w;
+    scoped_world w;
     char *data;
     drape_recorder *recorder;
     set_up(&w);
@@ -284,9 +281,7 @@ START_TEST(the_last_frame_comes_once)
     drape_recorder_destroy(&recorder);
     drape_recorder_destroy(&recorder);
     drape_recorder_destroy(NULL);
-    tear_down(&w);
 }
-END_TEST
 
 /* Compares the names, positions and triangles of an OBJ file, the positions with x. */
 static void check_obj(const world *w, const char *name, const double *x)
@@ -318,9 +313,9 @@ static void check_obj(const world *w, const char *name, const double *x)
     ck_assert_int_eq(triangles, TRIANGLES);
 }
 
-START_TEST(obj_parses_back)
+TEST(obj_parses_back)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     run(&w, "obj", 0.06);
     ck_assert_int_eq(count_files(w.out, ".obj"), 4);
@@ -329,9 +324,7 @@ START_TEST(obj_parses_back)
     check_obj(&w, "frame_000002.obj", w.seen.x[2]);
     check_obj(&w, "frame_000003.obj", drape_sim_positions(w.sim));
     ck_assert_int_eq(count_files(w.out, ".part"), 0);
-    tear_down(&w);
 }
-END_TEST
 
 static void check_ply(const world *w, const char *name, const double *x)
 {
@@ -356,9 +349,9 @@ static void check_ply(const world *w, const char *name, const double *x)
     free(data);
 }
 
-START_TEST(ply_parses_back)
+TEST(ply_parses_back)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     ck_assert_int_eq(drape_model_node_count(w.model), NODES);
     ck_assert_int_eq(drape_model_triangle_count(w.model), TRIANGLES);
@@ -367,13 +360,11 @@ START_TEST(ply_parses_back)
     check_ply(&w, "frame_000000.ply", w.seen.x[0]);
     check_ply(&w, "frame_000001.ply", w.seen.x[1]);
     check_ply(&w, "frame_000002.ply", drape_sim_positions(w.sim));
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(every_format_writes_the_same_frames)
+TEST(every_format_writes_the_same_frames)
 {
-    world w;
+    scoped_world w;
     const char *formats[32];
     size_t count = 0;
     char *data;
@@ -397,12 +388,10 @@ START_TEST(every_format_writes_the_same_frames)
     ck_assert_int_eq(count_files(w.out, ".npy"), 1);
     ck_assert_int_eq(count_files(w.out, ".part"), 0);
     drape_recorder_destroy(&recorder);
-    tear_down(&w);
 }
-END_TEST
 
 /* Everything that an earlier run wrote goes; what is named alike is somebody else's. */
-START_TEST(old_frames_are_removed_and_nothing_else)
+TEST(old_frames_are_removed_and_nothing_else)
 {
     static const char *const old[] = {"frame_000001.obj", "frame_000001.ply", "frame_000001.vtp",
                                       "frames.pvd",       "positions.pc2",    "positions.obj",
@@ -410,7 +399,7 @@ START_TEST(old_frames_are_removed_and_nothing_else)
     static const char *const other[] = {"frame_12345.obj",     "frame_000123.obj", "my_frame_000123.obj",
                                         "frame_000123.stl",    "frame_00012x.obj", "frame_000123.obj.bak",
                                         "frame_000123.OBJ.png"};
-    world w;
+    scoped_world w;
     drape_recorder *recorder;
     const char *formats[16];
     size_t count = 0;
@@ -434,9 +423,7 @@ START_TEST(old_frames_are_removed_and_nothing_else)
         ck_assert_msg(!exists(w.out, old[i]), "%s", old[i]);
     for (size_t i = 0; i < sizeof other / sizeof *other; i++)
         ck_assert_msg(exists(w.out, other[i]), "%s", other[i]);
-    tear_down(&w);
 }
-END_TEST
 
 /* ---- Step log */
 
@@ -520,9 +507,9 @@ static void check_row(char *const *field, const drape_attempt *a, const drape_en
     ck_assert_str_eq(field[23], ""); /* this scene has none; cli/cli runs one that has */
 }
 
-START_TEST(steps_has_a_row_for_each_attempt)
+TEST(steps_has_a_row_for_each_attempt)
 {
-    world w;
+    scoped_world w;
     size_t size;
     set_up(&w);
     run(&w, NULL, 0.11);
@@ -536,11 +523,9 @@ START_TEST(steps_has_a_row_for_each_attempt)
     }
     ck_assert_ptr_eq(row, data + size);
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(steps_quotes_and_keeps_digits)
+TEST(steps_quotes_and_keeps_digits)
 {
     const drape_attempt attempt = {
         .index = INT64_C(9007199254740991),
@@ -560,7 +545,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     node.diagnostic = (drape_diagnostic){"residual", "", -1, {381, -1, -1, -1}, 0, 1, 2};
     const drape_attempt *const attempts[] = {&attempt, &calm, &node};
     const drape_energy energy = {1 / 3.0, 1e300, -1e-300, 0, 2.5, -0.1};
-    world w;
+    scoped_world w;
     size_t size;
     drape_file file;
     set_up(&w);
@@ -580,9 +565,7 @@ START_TEST(steps_quotes_and_keeps_digits)
         check_row(field, attempts[i], &energy);
     }
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
 /* ---- Energies */
 
@@ -592,9 +575,9 @@ static const char energy_columns[] =
 
 /* The energies of frame k are those of the first state at or after it, as the attempts reported them.
  * Frames of 1/40 s lie on and between steps of 1/100 s; the first one is before all steps. */
-START_TEST(energies_are_of_the_state_at_or_after_the_frame)
+TEST(energies_are_of_the_state_at_or_after_the_frame)
 {
-    world w;
+    scoped_world w;
     size_t size;
     set_up(&w);
     const drape_energy start = drape_sim_energy(w.sim);
@@ -622,9 +605,7 @@ START_TEST(energies_are_of_the_state_at_or_after_the_frame)
     }
     ck_assert_ptr_eq(row, data + size);
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
 /* ---- Failures */
 
@@ -668,9 +649,9 @@ static void run_on_small_disk(world *w, const char *format, size_t size, const c
     ck_assert_int_eq(count_files(w->out, ".part"), 0);
 }
 
-START_TEST(full_disk_leaves_a_valid_npy)
+TEST(full_disk_leaves_a_valid_npy)
 {
-    world w;
+    scoped_world w;
     char *data;
     set_up(&w);
     run_on_small_disk(&w, "npy", HEADER_SIZE + 5 * FRAME_SIZE / 2, "positions.npy");
@@ -679,26 +660,21 @@ START_TEST(full_disk_leaves_a_valid_npy)
     for (int k = 0; k < 2; k++)
         ck_assert_int_eq(memcmp(data + HEADER_SIZE + k * FRAME_SIZE, w.seen.x[k], FRAME_SIZE), 0);
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(full_disk_leaves_whole_rows)
+TEST(full_disk_leaves_whole_rows)
 {
-    world w;
+    scoped_world w;
     size_t size;
     set_up(&w);
     run_on_small_disk(&w, NULL, 1000, "steps.csv");
-    char *data = file_read(in_folder(w.out, "steps.csv"), &size);
+    scoped_memory char *data = file_read(in_folder(w.out, "steps.csv"), &size);
     ck_assert_uint_gt(size, strlen(columns));
     ck_assert_uint_le(size, 1000);
     ck_assert_int_eq(data[size - 1], '\n');
-    free(data);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(full_disk_leaves_no_half_frame)
+TEST(full_disk_leaves_no_half_frame)
 {
     static const struct {
         const char *format, *file;
@@ -708,14 +684,12 @@ START_TEST(full_disk_leaves_no_half_frame)
                  {"glb", "positions.glb"},
                  {"pc2", "positions.obj"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        world w;
+        scoped_world w;
         set_up(&w);
         run_on_small_disk(&w, cases[i].format, 500, cases[i].file);
         ck_assert_int_eq(count_files(w.out, cases[i].file), 0);
-        tear_down(&w);
     }
 }
-END_TEST
 
 static uint32_t word_at(const char *data, size_t at)
 {
@@ -727,7 +701,7 @@ static uint32_t word_at(const char *data, size_t at)
 static uint32_t check_pc2(const world *w)
 {
     size_t size;
-    char *data = file_read(in_folder(w->out, "positions.pc2"), &size);
+    scoped_memory char *data = file_read(in_folder(w->out, "positions.pc2"), &size);
     ck_assert_uint_ge(size, 32);
     ck_assert_int_eq(memcmp(data, "POINTCACHE2\0\1\0\0", 16), 0);
     uint32_t points = word_at(data, 16), samples = word_at(data, 28);
@@ -738,26 +712,23 @@ static uint32_t check_pc2(const world *w)
         memcpy(&value, data + 32 + 4 * (size_t)i, 4);
         ck_assert(value == (float)w->seen.x[i / (NODES * 3)][i % (NODES * 3)]);
     }
-    free(data);
     return samples;
 }
 
-START_TEST(full_disk_leaves_a_valid_point_cache)
+TEST(full_disk_leaves_a_valid_point_cache)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     run_on_small_disk(&w, "pc2", 32 + 9 * NODES * 12 / 2 + 3000, "positions.pc2");
     ck_assert_uint_ge(check_pc2(&w), 4);
-    tear_down(&w);
 }
-END_TEST
 
 /* The JSON of a binary glTF, whose lengths must fit the file; to be freed by json_decref. */
 static json_t *load_glb(const world *w)
 {
     size_t size;
     json_error_t error;
-    char *data = file_read(in_folder(w->out, "positions.glb"), &size);
+    scoped_memory char *data = file_read(in_folder(w->out, "positions.glb"), &size);
     ck_assert_uint_ge(size, 28);
     ck_assert_int_eq(memcmp(data, "glTF\2\0\0", 8), 0);
     ck_assert_uint_eq(word_at(data, 8), size);
@@ -767,7 +738,6 @@ static json_t *load_glb(const world *w)
     ck_assert_msg(json != NULL, "%s", error.text);
     json_t *buffer = json_array_get(json_object_get(json, "buffers"), 0);
     ck_assert_int_eq(json_integer_value(json_object_get(buffer, "byteLength")), binary);
-    free(data);
     return json;
 }
 
@@ -783,18 +753,16 @@ static size_t count_targets(const json_t *json)
 }
 
 /* 13 frames take 13 x 2 304 bytes; there is room for all but the last ones. */
-START_TEST(full_disk_leaves_a_valid_glb)
+TEST(full_disk_leaves_a_valid_glb)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     run_on_small_disk(&w, "glb", 38000, "positions.glb");
     json_t *json = load_glb(&w);
     size_t targets = count_targets(json);
     ck_assert(targets > 2 && targets < 12);
     json_decref(json);
-    tear_down(&w);
 }
-END_TEST
 
 /* Writes frames of the model at rest, on a disk that takes files of `size` bytes, until one fails; returns
  * the number of those that succeeded. */
@@ -817,7 +785,7 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     drape_status status = DRAPE_OK;
     int frames = 0;
     char message[1024];
-    void *state = calloc(1, ops->state_size);
+    scoped_memory void *state = calloc(1, ops->state_size);
     ck_assert_int_eq(drape_file_create_in(w->ctx, folder, &whole), DRAPE_OK);
     ck_assert_int_eq(ops->open(&def, state), DRAPE_OK);
     fill_disk(size, &old);
@@ -842,16 +810,15 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     free_disk(&old);
     drape_context_set_message(w->ctx, "%s", message);
     ck_assert_int_eq(status, DRAPE_E_FILE);
-    free(state);
     return frames - 1;
 }
 
 /* Wherever the disk is full, the collection names only whole frames: its list outgrows the limit, which the
  * frames themselves, of about 9 kB, do not. */
-START_TEST(full_disk_leaves_a_valid_collection)
+TEST(full_disk_leaves_a_valid_collection)
 {
     for (size_t room = 12000; room < 12090; room += 5) {
-        world w;
+        scoped_world w;
         size_t size;
         const drape_exporter_ops *vtp =
             drape_exporters[drape_registry_find(&drape_exporter_registry, NULL, "vtp")];
@@ -861,7 +828,7 @@ START_TEST(full_disk_leaves_a_valid_collection)
         int frames = write_frames(&w, vtp, room), named = 0;
         ck_assert_msg(strstr(drape_context_message(w.ctx), "frames.pvd") != NULL, "%s",
                       drape_context_message(w.ctx));
-        char *data = file_read(in_folder(w.out, "frames.pvd"), &size);
+        scoped_memory char *data = file_read(in_folder(w.out, "frames.pvd"), &size);
         ck_assert_uint_le(size, room);
         ck_assert_str_eq(data + size - strlen("</Collection></VTKFile>\n"), "</Collection></VTKFile>\n");
         ck_assert_ptr_eq(strstr(data, "</Collection>"), data + size - strlen("</Collection></VTKFile>\n"));
@@ -869,11 +836,8 @@ START_TEST(full_disk_leaves_a_valid_collection)
             named++;
         ck_assert_int_eq(named, frames);
         ck_assert_int_gt(frames, 100);
-        free(data);
-        tear_down(&w);
     }
 }
-END_TEST
 
 static void refuse(world *w, const char *format, drape_status expected, const char *part)
 {
@@ -885,14 +849,14 @@ static void refuse(world *w, const char *format, drape_status expected, const ch
 }
 
 /* Files of so few bytes that the manifest, a table or the frames cannot begin. */
-START_TEST(a_disk_full_from_the_start_is_reported_at_once)
+TEST(a_disk_full_from_the_start_is_reported_at_once)
 {
     const struct {
         size_t room;
         const char *format, *name;
     } cases[] = {{0, NULL, "/manifest.jsonl"}, {160, NULL, "/steps.csv"}, {100, "npy", "/positions.npy"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        world w;
+        scoped_world w;
         struct rlimit old;
         char part[100];
         set_up(&w);
@@ -901,14 +865,12 @@ START_TEST(a_disk_full_from_the_start_is_reported_at_once)
         refuse(&w, cases[i].format, DRAPE_E_FILE, part);
         free_disk(&old);
         ck_assert(!exists(w.out, cases[i].name + 1));
-        tear_down(&w);
     }
 }
-END_TEST
 
-START_TEST(bad_folders_are_refused)
+TEST(bad_folders_are_refused)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     write_text(in_folder(w.folder, "file"), "");
     snprintf(w.out, sizeof w.out, "%s/file", w.folder);
@@ -929,20 +891,16 @@ START_TEST(bad_folders_are_refused)
     snprintf(w.out, sizeof w.out, "%s/", w.folder); /* a slash at the end is allowed */
     run(&w, "npy", 0);
     ck_assert(exists(w.folder, "positions.npy"));
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(unknown_formats_are_refused_before_anything_is_made)
+TEST(unknown_formats_are_refused_before_anything_is_made)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     refuse(&w, "npz", DRAPE_E_ARGUMENT, "did you mean \"npy\"?");
     refuse(&w, "holography", DRAPE_E_ARGUMENT, "there are npy, obj, ply");
     ck_assert(!exists(w.folder, "a"));
-    tear_down(&w);
 }
-END_TEST
 
 /* ---- Memory */
 
@@ -970,8 +928,7 @@ static void meter_release(void *user, void *memory)
 static drape_context *metered_context(meter *m)
 {
     drape_context *ctx;
-    drape_context_def def;
-    drape_context_def_init(&def, sizeof def);
+    drape_context_def def = context_def();
     def.allocate = meter_allocate;
     def.release = meter_release;
     def.allocator_user = m;
@@ -980,9 +937,9 @@ static drape_context *metered_context(meter *m)
     return ctx;
 }
 
-START_TEST(each_allocation_may_fail)
+TEST(each_allocation_may_fail)
 {
-    world w;
+    scoped_world w;
     meter m = {0};
     set_up(&w);
     drape_context *ctx = metered_context(&m);
@@ -1015,9 +972,7 @@ START_TEST(each_allocation_may_fail)
     drape_recorder_destroy(&recorder);
     ck_assert_int_eq(m.held, 1);
     drape_context_destroy(&ctx);
-    tear_down(&w);
 }
-END_TEST
 
 /* ---- Summary */
 
@@ -1088,9 +1043,9 @@ static void check_reasons(const json_t *reasons, const world *w)
     ck_assert_uint_eq(json_object_size(reasons), i);
 }
 
-START_TEST(summary_is_complete)
+TEST(summary_is_complete)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     run(&w, NULL, 0.11);
     const drape_summary_def def = {DRAPE_E_STEP_TOO_SMALL, "t = 0.1: worst edge \"7\"", 6, 1.25, 0.1};
@@ -1119,13 +1074,11 @@ START_TEST(summary_is_complete)
     check_reasons(json_object_get(json_object_get(json, "steps"), "reasons"), &w);
     ck_assert_int_eq(count_files(w.out, ".part"), 0);
     json_decref(json);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(summary_is_always_json)
+TEST(summary_is_always_json)
 {
-    world w;
+    scoped_world w;
     set_up(&w);
     const drape_summary_def def = {DRAPE_OK, "n\xc3\xa4he \xff.json", 0, NAN, INFINITY};
     const drape_summary_def plain = {DRAPE_OK, NULL, 0, 0, 0};
@@ -1141,13 +1094,11 @@ START_TEST(summary_is_always_json)
     ck_assert_str_eq(json_string_value(json_object_get(json, "message")), "");
     ck_assert_str_eq(json_string_value(json_object_get(json, "status")), "ok");
     json_decref(json);
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(summary_fails_whole)
+TEST(summary_fails_whole)
 {
-    world w;
+    scoped_world w;
     struct rlimit old;
     size_t size;
     const drape_summary_def def = {DRAPE_OK, NULL, 0, 0, 0};
@@ -1173,14 +1124,12 @@ START_TEST(summary_fails_whole)
     ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "No space left on device"));
     ck_assert(exists(w.folder, "full"));
     ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, NULL, "/dev/null"), DRAPE_OK);
-    tear_down(&w);
 }
-END_TEST
 
 /* In a host with a German locale printf writes 0,5: the files must not. */
-START_TEST(numbers_do_not_follow_the_locale)
+TEST(numbers_do_not_follow_the_locale)
 {
-    world w;
+    scoped_world w;
     size_t size;
     const drape_summary_def def = {DRAPE_OK, NULL, 0, 0.5, 0};
     bool comma = comma_begin();
@@ -1198,9 +1147,7 @@ START_TEST(numbers_do_not_follow_the_locale)
     ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
     check_number(field[2], w.seen.attempt[0].h);
     free(data);
-    tear_down(&w);
 }
-END_TEST
 
 /* Whether Drape wrote the file of a name: to be refused, or replaced. */
 static bool takes(const void *name, const char *file)
@@ -1210,10 +1157,10 @@ static bool takes(const void *name, const char *file)
 
 /* The manifest of a folder is JSON whatever the names in it are: the next process knows them again, and
  * writes them anew. */
-START_TEST(any_name_is_found_again)
+TEST(any_name_is_found_again)
 {
     char longest[256];
-    world w;
+    scoped_world w;
     set_up(&w);
     memset(longest, '\1', 255);
     longest[255] = 0;
@@ -1239,11 +1186,9 @@ START_TEST(any_name_is_found_again)
         }
         drape_folder_close(&folder);
     }
-    tear_down(&w);
 }
-END_TEST
 
-START_TEST(names_match_patterns)
+TEST(names_match_patterns)
 {
     static const struct {
         const char *pattern, *name;
@@ -1267,14 +1212,3 @@ START_TEST(names_match_patterns)
         ck_assert(!found || number == cases[i].number);
     }
 }
-END_TEST
-
-SUITE("io", npy_is_exact, the_last_frame_comes_once, obj_parses_back, ply_parses_back,
-      every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
-      energies_are_of_the_state_at_or_after_the_frame, steps_has_a_row_for_each_attempt,
-      steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy, full_disk_leaves_whole_rows,
-      full_disk_leaves_no_half_frame, full_disk_leaves_a_valid_point_cache, full_disk_leaves_a_valid_glb,
-      full_disk_leaves_a_valid_collection, a_disk_full_from_the_start_is_reported_at_once,
-      bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made, each_allocation_may_fail,
-      summary_is_complete, summary_is_always_json, summary_fails_whole, numbers_do_not_follow_the_locale,
-      any_name_is_found_again, names_match_patterns)

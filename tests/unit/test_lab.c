@@ -7,13 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-static drape_context *new_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 static drape_model *sheet(drape_context *ctx, double columns, double rows)
 {
     const drape_setting grid[] = {
@@ -21,13 +14,10 @@ static drape_model *sheet(drape_context *ctx, double columns, double rows)
     static const drape_setting material[] = {
         {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
     static const int32_t pinned[] = {0};
-    drape_pin_def pin;
-    drape_cloth_def cloth;
-    drape_scene_def scene;
+    drape_pin_def pin = pin_def();
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def scene = scene_def();
     drape_model *model = NULL;
-    drape_scene_def_init(&scene, sizeof scene);
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_pin_def_init(&pin, sizeof pin);
     pin.nodes = pinned;
     pin.node_count = 1;
     cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
@@ -42,7 +32,7 @@ static drape_model *sheet(drape_context *ctx, double columns, double rows)
 }
 
 /* y = 3 x^2 exactly: the slope is 2 up to rounding, with an uncertainty of 0. */
-START_TEST(a_power_is_found_exactly)
+TEST(a_power_is_found_exactly)
 {
     double x[6], y[6];
     for (int i = 0; i < 6; i++) {
@@ -54,12 +44,11 @@ START_TEST(a_power_is_found_exactly)
     ck_assert_double_eq_tol(exp(line.intercept), 3, 1e-11);
     ck_assert_double_eq_tol(line.high - line.low, 0, 1e-6);
 }
-END_TEST
 
 /* Residuals of +d, -2d, +d in the logarithms, at abscissae -1, 0, 1 (times log 2), do not change the slope;
  * its standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 %
  * is 12.7062. */
-START_TEST(confidence_is_students)
+TEST(confidence_is_students)
 {
     const double d = 1e-3, x[] = {0.5, 1, 2}, y[] = {0.5 * exp(d), exp(-2 * d), 2 * exp(d)};
     lab_line line = lab_fit_power(x, y, 3);
@@ -69,14 +58,13 @@ START_TEST(confidence_is_students)
     ck_assert_double_eq_tol(line.slope - line.low, half, 1e-8);
     ck_assert(isnan(lab_fit_power(x, y, 2).low));
 }
-END_TEST
 
 /* A field that is linear in the rest positions is linear in every triangle: its interpolation at the nodes of
  * another mesh is exact, whichever triangle a point on an edge is assigned to. */
-START_TEST(a_linear_field_is_taken_exactly)
+TEST(a_linear_field_is_taken_exactly)
 {
-    drape_context *ctx = new_context();
-    drape_model *coarse = sheet(ctx, 6, 4), *fine = sheet(ctx, 8, 9);
+    scoped_context *ctx = make_context();
+    scoped_model *coarse = sheet(ctx, 6, 4), *fine = sheet(ctx, 8, 9);
     drape_arena arena = drape_arena_of(ctx);
     lab_probe probe;
     size_t n = 3 * (size_t)drape_model_node_count(fine), points = (size_t)drape_model_node_count(coarse);
@@ -98,17 +86,13 @@ START_TEST(a_linear_field_is_taken_exactly)
     drape_arena_free(&arena);
     drape_free(ctx, x);
     drape_free(ctx, out);
-    drape_model_destroy(&coarse);
-    drape_model_destroy(&fine);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Pinned nodes do not count: if all free ones have moved by 5, the distance is 5. */
-START_TEST(a_distance_is_of_the_free_nodes)
+TEST(a_distance_is_of_the_free_nodes)
 {
-    drape_context *ctx = new_context();
-    drape_model *model = sheet(ctx, 3, 3);
+    scoped_context *ctx = make_context();
+    scoped_model *model = sheet(ctx, 3, 3);
     double x[27] = {0}, y[27] = {0};
     for (int i = 1; i < 9; i++) {
         y[3 * i] = 3;
@@ -116,12 +100,9 @@ START_TEST(a_distance_is_of_the_free_nodes)
     }
     y[1] = 1e3; /* the pinned one */
     ck_assert_double_eq_tol(lab_distance(model, x, y), 5, 1e-14);
-    drape_model_destroy(&model);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
-START_TEST(a_value_of_a_scene_has_its_unit)
+TEST(a_value_of_a_scene_has_its_unit)
 {
     static const struct {
         const char *pointer, *unit;
@@ -144,7 +125,3 @@ START_TEST(a_value_of_a_scene_has_its_unit)
         ck_assert_msg(strcmp(lab_unit(known[i].pointer), known[i].unit) == 0, "%s: \"%s\", not \"%s\"",
                       known[i].pointer, lab_unit(known[i].pointer), known[i].unit);
 }
-END_TEST
-
-SUITE("lab", a_power_is_found_exactly, confidence_is_students, a_linear_field_is_taken_exactly,
-      a_distance_is_of_the_free_nodes, a_value_of_a_scene_has_its_unit)

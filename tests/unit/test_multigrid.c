@@ -6,13 +6,11 @@
 /* Conjugate gradients to 1e-6 for a rough right-hand side. */
 static int iterations(sheet *q)
 {
-    double *b = take(q->p.n), *x = take(q->p.n);
+    scoped_memory double *b = take(q->p.n), *x = take(q->p.n);
     fill(b, q->p.n, 7);
     drape_pcg s = drape_pcg_of(q->arena, q->p.n, q, multiply, precondition);
     drape_pcg_solve(&s, b, x, 1e-6, 200);
     ck_assert(s.definite && s.converged);
-    free(b);
-    free(x);
     return s.iterations;
 }
 
@@ -20,10 +18,10 @@ static int iterations(sheet *q)
 
 /* Against the products of the whole pattern. A row has 13 blocks of 3 numbers: rounding of 1e-14 of its
  * terms, which are at most 1e5 N/m here. */
-START_TEST(half_of_the_matrix_gives_the_product)
+TEST(half_of_the_matrix_gives_the_product)
 {
-    sheet q = open_sheet(20);
-    double *x = take(q.p.n), *y = take(q.p.n);
+    scoped_sheet q = open_sheet(20);
+    scoped_memory double *x = take(q.p.n), *y = take(q.p.n);
     factor(&q);
     fill(x, q.p.n, 3);
     drape_multigrid_multiply(q.m, x, y);
@@ -33,17 +31,13 @@ START_TEST(half_of_the_matrix_gives_the_product)
             sum += q.values[k] * x[drape_pattern_row(&q.p, c, k)];
         ck_assert_double_eq_tol(y[c], sum, 1e-9);
     }
-    free(x);
-    free(y);
-    close_sheet(&q);
 }
-END_TEST
 
 /* 49 nodes are one level: the matrix is factored itself. The condition number is about 1e3. */
-START_TEST(one_level_is_exact)
+TEST(one_level_is_exact)
 {
-    sheet q = open_sheet(7);
-    double *b = take(q.p.n), *x = take(q.p.n), *back = take(q.p.n);
+    scoped_sheet q = open_sheet(7);
+    scoped_memory double *b = take(q.p.n), *x = take(q.p.n), *back = take(q.p.n);
     factor(&q);
     ck_assert_int_eq(drape_multigrid_levels(q.m), 1);
     fill(b, q.p.n, 5);
@@ -51,20 +45,15 @@ START_TEST(one_level_is_exact)
     drape_multigrid_multiply(q.m, x, back);
     for (int64_t i = 0; i < q.p.n; i++)
         ck_assert_double_eq_tol(back[i], b[i], 1e-10);
-    free(b);
-    free(x);
-    free(back);
-    close_sheet(&q);
 }
-END_TEST
 
 /* x'By = y'Bx to the rounding of sums of n terms; x'Bx > 0, for smooth vectors, too, which only the coarse
  * levels act upon. */
-START_TEST(the_preconditioner_is_symmetric_and_positive_definite)
+TEST(the_preconditioner_is_symmetric_and_positive_definite)
 {
-    sheet q = open_sheet(60);
+    scoped_sheet q = open_sheet(60);
     const int64_t n = q.p.n;
-    double *x = take(n), *y = take(n), *Bx = take(n), *By = take(n);
+    scoped_memory double *x = take(n), *y = take(n), *Bx = take(n), *By = take(n);
     factor(&q);
     ck_assert_int_ge(drape_multigrid_levels(q.m), 3);
     for (uint64_t seed = 1; seed <= 6; seed++) {
@@ -78,45 +67,34 @@ START_TEST(the_preconditioner_is_symmetric_and_positive_definite)
         const double size = sqrt(dot(x, Bx, n) * dot(y, By, n));
         ck_assert_double_le(fabs(dot(x, By, n) - dot(y, Bx, n)), 1e-10 * size);
     }
-    free(x);
-    free(y);
-    free(Bx);
-    free(By);
-    close_sheet(&q);
 }
-END_TEST
 
 /* 8 and 13 iterations; inertia, which bounds the condition number, is 16 times smaller in the large sheet.
  * With a single coarse level or none the numbers are a multiple of these and grow with the nodes along a
  * side; with aggregates of all nodes that bending couples they are 9 and 18. */
-START_TEST(a_large_stiff_sheet_takes_few_iterations)
+TEST(a_large_stiff_sheet_takes_few_iterations)
 {
-    sheet small = open_sheet(30), large = open_sheet(120);
+    scoped_sheet small = open_sheet(30), large = open_sheet(120);
     factor(&small);
     factor(&large);
     const int few = iterations(&small), many = iterations(&large);
     ck_assert_msg(few <= 10 && many <= 16, "%d and %d iterations", few, many);
-    close_sheet(&small);
-    close_sheet(&large);
 }
-END_TEST
 
-START_TEST(a_matrix_that_is_not_positive_definite_is_noticed)
+TEST(a_matrix_that_is_not_positive_definite_is_noticed)
 {
-    sheet q = open_sheet(60);
+    scoped_sheet q = open_sheet(60);
     int64_t stride;
     double *at = drape_pattern_at(&q.p, q.values, 1000, q.p.diagonal[1000], &stride);
     *at = -1;
     ck_assert_int_eq(drape_multigrid_factor(q.m, q.values, q.x), DRAPE_RETRY_LINEAR);
-    close_sheet(&q);
 }
-END_TEST
 
 /* Pieces that are coupled to nothing else, single nodes among them, end the levels. */
-START_TEST(separate_nodes)
+TEST(separate_nodes)
 {
-    drape_context *ctx = make_context();
-    drape_arena *arena = drape_arena_create(ctx);
+    scoped_context *ctx = make_context();
+    scoped_arena *arena = drape_arena_create(ctx);
     drape_pattern p;
     drape_multigrid *m;
     int32_t own[200];
@@ -132,11 +110,4 @@ START_TEST(separate_nodes)
     drape_multigrid_apply(m, b, x);
     for (int i = 0; i < 600; i++)
         ck_assert_double_eq(x[i], b[i] / 2);
-    drape_arena_destroy(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("multigrid", half_of_the_matrix_gives_the_product, one_level_is_exact,
-      the_preconditioner_is_symmetric_and_positive_definite, a_large_stiff_sheet_takes_few_iterations,
-      a_matrix_that_is_not_positive_definite_is_noticed, separate_nodes)

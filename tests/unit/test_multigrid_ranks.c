@@ -132,6 +132,8 @@ static void close_piece(piece *q)
     drape_context_destroy(&q->ctx);
 }
 
+#define scoped_piece SCOPED(close_piece) piece
+
 /* Ranks of which each has a strip, or a random choice of the nodes, where all rows are at a border. The sheet
  * is turned, because sums of absolute values, unlike norms of blocks, are larger then. */
 static shared share_sheet(int32_t side, int ranks, bool random)
@@ -162,6 +164,8 @@ static void close_shared(shared *s)
     free(s->number);
 }
 
+#define scoped_shared SCOPED(close_shared) shared
+
 static void gather(const piece *q, const double *from, double *to)
 {
     for (int32_t i = 0; i < q->ranks.own_blocks; i++)
@@ -179,24 +183,21 @@ static void scatter(const piece *q, const double *from, double *to)
 static void multiply_piece(const drape_ranks *ranks, void *user)
 {
     shared *s = user;
-    piece q = open_piece(ranks, s);
-    double *x = take(q.p.n), *y = take(q.p.n);
+    scoped_piece q = open_piece(ranks, s);
+    scoped_memory double *x = take(q.p.n), *y = take(q.p.n);
     factor_piece(&q, ranks);
     scatter(&q, s->b, x);
     drape_multigrid_multiply(q.m, x, y);
     gather(&q, y, s->out);
-    free(x);
-    free(y);
-    close_piece(&q);
 }
 
 /* To the rounding of sums of 13 blocks of 3 numbers, of which the terms are at most 1e5 N/m. */
-START_TEST(the_product_is_that_of_the_whole_matrix)
+TEST(the_product_is_that_of_the_whole_matrix)
 {
     for (int random = 0; random < 2; random++) {
-        shared s = share_sheet(20, 3, random);
+        scoped_shared s = share_sheet(20, 3, random);
         const int64_t n = s.whole.p.n;
-        double *b = take(n), *whole = take(n);
+        scoped_memory double *b = take(n), *whole = take(n);
         fill(b, n, 3);
         s.b = b;
         s.out = take(n);
@@ -206,18 +207,14 @@ START_TEST(the_product_is_that_of_the_whole_matrix)
         for (int64_t i = 0; i < n; i++)
             ck_assert_double_eq_tol(s.out[i], whole[i], 1e-9);
         free(s.out);
-        free(b);
-        free(whole);
-        close_shared(&s);
     }
 }
-END_TEST
 
 static void solve_piece(const drape_ranks *ranks, void *user)
 {
     shared *s = user;
-    piece q = open_piece(ranks, s);
-    double *b = take(q.p.n), *x = take(q.p.n);
+    scoped_piece q = open_piece(ranks, s);
+    scoped_memory double *b = take(q.p.n), *x = take(q.p.n);
     const bool factored = factor_piece(&q, ranks);
     scatter(&q, s->b, b);
     const sheet own = {.m = q.m};
@@ -233,14 +230,11 @@ static void solve_piece(const drape_ranks *ranks, void *user)
     const double failures = drape_ranks_sum(ranks, !factored);
     if (ranks->rank == 0)
         s->failures = (int)failures;
-    free(b);
-    free(x);
-    close_piece(&q);
 }
 
 static int iterations_on(int ranks, int32_t side, bool random)
 {
-    shared s = share_sheet(side, ranks, random);
+    scoped_shared s = share_sheet(side, ranks, random);
     double *b = take(s.whole.p.n);
     fill(b, s.whole.p.n, 7);
     s.b = b;
@@ -248,17 +242,16 @@ static int iterations_on(int ranks, int32_t side, bool random)
     ck_assert(s.converged);
     ck_assert_int_ge(s.levels, 2);
     free(b);
-    close_shared(&s);
     return s.iterations;
 }
 
 /* 12 or 13 on any number of ranks, 13 in one process; a fifth more and one is allowed. With sums of absolute
  * values in place of norms of blocks they are 52 on 2 ranks. One rank, with the code of several, has those of
  * one process. */
-START_TEST(iterations_are_those_of_one_process)
+TEST(iterations_are_those_of_one_process)
 {
-    sheet q = open_sheet(120);
-    double *b = take(q.p.n), *x = take(q.p.n);
+    scoped_sheet q = open_sheet(120);
+    scoped_memory double *b = take(q.p.n), *x = take(q.p.n);
     fill(b, q.p.n, 7);
     factor(&q);
     drape_pcg one = drape_pcg_of(q.arena, q.p.n, &q, multiply, precondition);
@@ -269,15 +262,11 @@ START_TEST(iterations_are_those_of_one_process)
         ck_assert_msg(found <= 1.2 * one.iterations + (ranks > 1), "%d ranks: %d for %d", ranks, found,
                       one.iterations);
     }
-    free(b);
-    free(x);
-    close_sheet(&q);
 }
-END_TEST
 
-START_TEST(a_matrix_that_is_not_positive_definite_is_noticed_by_all)
+TEST(a_matrix_that_is_not_positive_definite_is_noticed_by_all)
 {
-    shared s = share_sheet(30, 3, false);
+    scoped_shared s = share_sheet(30, 3, false);
     int64_t stride;
     double *b = take(s.whole.p.n);
     *drape_pattern_at(&s.whole.p, s.whole.values, 100, s.whole.p.diagonal[100], &stride) = -1;
@@ -285,9 +274,7 @@ START_TEST(a_matrix_that_is_not_positive_definite_is_noticed_by_all)
     ck_assert(run_ranks(3, solve_piece, &s));
     ck_assert_int_eq(s.failures, 3);
     free(b);
-    close_shared(&s);
 }
-END_TEST
 
 /* ---- Symmetry ---- */
 
@@ -301,7 +288,7 @@ static void fetch_columns(const drape_ranks *ranks, double *blocks)
 static void judge_piece(const drape_ranks *ranks, void *user)
 {
     shared *s = user;
-    piece q = open_piece(ranks, s);
+    scoped_piece q = open_piece(ranks, s);
     const int32_t own = q.ranks.own_blocks, copies = q.p.block_count - own;
     drape_ranks *here = (drape_ranks *)(uintptr_t)ranks;
     int32_t *rank = drape_arena_take(q.arena, (size_t)copies, sizeof *rank),
@@ -317,12 +304,10 @@ static void judge_piece(const drape_ranks *ranks, void *user)
     here->fetch_blocks = fetch_columns;
     q.p.ranks = here;
     columns = team_plan(ranks, q.arena, copies, rank, place, 3 * sizeof(double));
-    double *diagonal = take(q.p.n);
+    scoped_memory double *diagonal = take(q.p.n);
     const double symmetric = drape_ranks_sum(ranks, drape_pattern_is_symmetric(&q.p, q.values, diagonal));
     if (ranks->rank == 0)
         s->failures = ranks->count - (int)symmetric;
-    free(diagonal);
-    close_piece(&q);
 }
 
 /* Multiplies the scalar row and column of a component of a node; the sheet must be symmetric. */
@@ -344,11 +329,11 @@ static void scale_component(sheet *q, int32_t node, int component, double by)
 /* A component of a node of which row and column are 1e-6 of the others', and one entry 1 + 1e-8 times its
  * mirror image: a fault of symmetry, though it is 1e-14 of the largest entries of its block. Between two
  * nodes of a rank, and between nodes of two. */
-START_TEST(a_small_part_that_is_not_symmetric_is_found_by_all)
+TEST(a_small_part_that_is_not_symmetric_is_found_by_all)
 {
     const int32_t side = 12;
     for (int32_t column = 4; column < 8; column += 3) {
-        shared s = share_sheet(side, 3, false);
+        scoped_shared s = share_sheet(side, 3, false);
         sheet *q = &s.whole;
         const int32_t node = 5 * side + column, other = node + 1;
         int64_t stride;
@@ -363,10 +348,8 @@ START_TEST(a_small_part_that_is_not_symmetric_is_found_by_all)
         block[2 * stride] *= 1 + 1e-8;
         ck_assert(run_ranks(3, judge_piece, &s));
         ck_assert_int_eq(s.failures, 3);
-        close_shared(&s);
     }
 }
-END_TEST
 
 /* ---- Memory ---- */
 
@@ -404,9 +387,9 @@ static void create_piece(const drape_ranks *ranks, void *user)
 
 /* Each allocation fails on one rank, first or not: all return the failure, with a message, and none waits for
  * ever. There are four levels here, of which ranks share three. */
-START_TEST(a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
+TEST(a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
 {
-    shared split = share_sheet(40, 3, false);
+    scoped_shared split = share_sheet(40, 3, false);
     for (int rank = 0; rank < 3; rank += 2) {
         shortage s = {.shared = &split, .rank = rank, .fail_at = 1};
         for (bool more = true; more; s.fail_at++) {
@@ -417,11 +400,4 @@ START_TEST(a_rank_that_alone_is_out_of_memory_leaves_none_waiting)
         printf("# rank %d: %ld allocations\n", rank, s.fail_at - 2);
         ck_assert_int_gt(s.fail_at, 100);
     }
-    close_shared(&split);
 }
-END_TEST
-
-SUITE("multigrid_ranks", the_product_is_that_of_the_whole_matrix, iterations_are_those_of_one_process,
-      a_matrix_that_is_not_positive_definite_is_noticed_by_all,
-      a_small_part_that_is_not_symmetric_is_found_by_all,
-      a_rank_that_alone_is_out_of_memory_leaves_none_waiting)

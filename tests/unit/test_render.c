@@ -28,9 +28,9 @@ static const char colliders[] =
 
 /* Every point lies on the surface: Newton steps on the exact distance move it there, and then it is rounded
  * to a float of at most 8 m, 5e-7. Normals have length 1 and point outwards. */
-START_TEST(bodies_lie_on_their_surface)
+TEST(bodies_lie_on_their_surface)
 {
-    scene h = scene_model(CLOTH, "", colliders);
+    scoped_scene h = scene_model(CLOTH, "", colliders);
     const drape_model *model = h.model;
     drape_arena arena = drape_arena_of(h.ctx);
     for (int32_t c = 0; c < model->collider_count; c++) {
@@ -50,16 +50,14 @@ START_TEST(bodies_lie_on_their_surface)
         assert_below(off, 5e-7);
     }
     drape_arena_free(&arena);
-    scene_close(&h);
 }
-END_TEST
 
 /* A point of the surface is at the corner of a box of half lengths .25, .15, .35 without rotation, up to the
  * attraction by the mean, 1 in 100 of a cell of 0.7 m / 56. */
-START_TEST(corners_of_a_box_are_sharp)
+TEST(corners_of_a_box_are_sharp)
 {
-    scene h = scene_model(CLOTH, "",
-                          ", 'colliders': [{'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
+    scoped_scene h = scene_model(
+        CLOTH, "", ", 'colliders': [{'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
     const drape_model *model = h.model;
     drape_arena arena = drape_arena_of(h.ctx);
     drape_body body;
@@ -72,18 +70,16 @@ START_TEST(corners_of_a_box_are_sharp)
     }
     assert_below((double)nearest, 0.01 * 0.7 / 56);
     drape_arena_free(&arena);
-    scene_close(&h);
 }
-END_TEST
 
 /* On a sphere every normal is that of the sphere: it is taken a twentieth of a cell above, which changes
  * its direction by less than that over the radius times the angle of a face, 1e-3. On a box every normal is
  * that of one of its sides. */
-START_TEST(bodies_are_round_or_crisp)
+TEST(bodies_are_round_or_crisp)
 {
-    scene h = scene_model(CLOTH, "",
-                          ", 'colliders': [{'type': 'sphere', 'center': [0, 1, 0], 'radius': 0.3},"
-                          " {'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
+    scoped_scene h = scene_model(CLOTH, "",
+                                 ", 'colliders': [{'type': 'sphere', 'center': [0, 1, 0], 'radius': 0.3},"
+                                 " {'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
     const drape_model *model = h.model;
     drape_arena arena = drape_arena_of(h.ctx);
     for (int c = 0; c < 2; c++) {
@@ -100,9 +96,7 @@ START_TEST(bodies_are_round_or_crisp)
         }
     }
     drape_arena_free(&arena);
-    scene_close(&h);
 }
-END_TEST
 
 /* ---- Cloth ---- */
 
@@ -110,13 +104,13 @@ END_TEST
  * those of the normals at the pairs by half; a curve between them would sink by about a quarter of that
  * times the edge, 7 mm, into the plane, and does so without a collider. With the plane no point is below
  * it. */
-START_TEST(curved_cloth_clears_colliders)
+TEST(curved_cloth_clears_colliders)
 {
     static const char *const planes[] = {
         "", ", 'colliders': [{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]}]"};
     for (int c = 0; c < 2; c++) {
         drape_skin skin;
-        scene h = scene_model(CLOTH, "", planes[c]);
+        scoped_scene h = scene_model(CLOTH, "", planes[c]);
         drape_arena arena = drape_arena_of(h.ctx);
         float x[3 * 81], lowest = 1;
         for (size_t i = 0; i < 81; i++) {
@@ -133,18 +127,16 @@ START_TEST(curved_cloth_clears_colliders)
         else
             ck_assert_msg(lowest > 0, "%g", (double)lowest);
         drape_arena_free(&arena);
-        scene_close(&h);
     }
 }
-END_TEST
 
 /* A flat sheet has 32 edges at its border. Its hem lies on both sides of it, no farther than its radius,
  * and not outside of it, up to the rounding of floats. */
-START_TEST(hem_lies_inside_the_border)
+TEST(hem_lies_inside_the_border)
 {
     drape_skin skin;
     float x[3 * 81], above = 0, below = 0;
-    scene h = scene_model(CLOTH, "", "");
+    scoped_scene h = scene_model(CLOTH, "", "");
     drape_arena arena = drape_arena_of(h.ctx);
     ck_assert_int_eq(drape_skin_create(&arena, h.model, &skin), DRAPE_OK);
     ck_assert_uint_eq(skin.border_count, 32);
@@ -164,17 +156,15 @@ START_TEST(hem_lies_inside_the_border)
     for (size_t i = 0; i < skin.hem_index_count; i++)
         ck_assert(skin.hem_index[i] < skin.hem_count);
     drape_arena_free(&arena);
-    scene_close(&h);
 }
-END_TEST
 
 /* Nodes on an eighth of a sphere of radius 1. Normals weighted by area are exact up to the square of an
  * edge's angle, below 0.16 rad; the points of curved patches are nearer to the sphere than flat triangles,
  * whose middles lie an eighth of that square inside. Nodes are drawn at their positions. */
-START_TEST(cloth_is_drawn_round_through_its_nodes)
+TEST(cloth_is_drawn_round_through_its_nodes)
 {
     drape_skin skin;
-    scene h = scene_model(CLOTH, "", "");
+    scoped_scene h = scene_model(CLOTH, "", "");
     drape_arena arena = drape_arena_of(h.ctx);
     const drape_model *model = h.model;
     float x[3 * 81];
@@ -204,20 +194,18 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
     for (size_t i = 0; i < skin.index_count; i++)
         ck_assert(skin.index[i] < skin.vertex_count);
     drape_arena_free(&arena);
-    scene_close(&h);
 }
-END_TEST
 
 /* Every triangle has the orientation of its mesh: the normal by its corners is on the side of the smooth
  * one. On a flat sheet the texture is as long as wide, with u along x and v away from the first row; seen
  * from the front it is not mirrored. */
-START_TEST(texture_is_not_mirrored)
+TEST(texture_is_not_mirrored)
 {
     static const char *const orientations[] = {"", ", 'orientation': 'vertical'"};
     for (int o = 0; o < 2; o++) {
         drape_skin skin;
         float x[3 * 81];
-        scene h = scene_model(CLOTH, orientations[o], "");
+        scoped_scene h = scene_model(CLOTH, orientations[o], "");
         drape_arena arena = drape_arena_of(h.ctx);
         const drape_model *model = h.model;
         ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
@@ -238,16 +226,14 @@ START_TEST(texture_is_not_mirrored)
             ck_assert(area > 0 && drape_dot(n, a->n) > 0);
         }
         drape_arena_free(&arena);
-        scene_close(&h);
     }
 }
-END_TEST
 
 /* ---- Colours, letters, camera ---- */
 
 /* Lightness in OKLab is close to the cube root of luminance (the weights of its L are all positive and sum
  * to 1). It rises in each of 256 steps, and each half of the ramp has half of the rise, to a tenth. */
-START_TEST(ramp_is_even_in_lightness)
+TEST(ramp_is_even_in_lightness)
 {
     double last = -1, middle = 0, first = 0;
     for (int i = 0; i < 256; i++) {
@@ -267,12 +253,11 @@ START_TEST(ramp_is_even_in_lightness)
     }
     ck_assert(fabs((middle - first) / (last - first) - 0.5) < 0.05);
 }
-END_TEST
 
 /* Every printable ASCII character has strokes within its cell; an unknown one is a box. */
-START_TEST(letters_are_all_there)
+TEST(letters_are_all_there)
 {
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_font font;
     char text[] = "x";
     const char *units = "²·°×", *unknown = "€";
@@ -302,13 +287,11 @@ START_TEST(letters_are_all_there)
     ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), 0);
     ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), -1);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* All points are in the picture, and the outermost ones are at the margin of 1/1.12 on two sides, up to
  * rounding. */
-START_TEST(camera_frames_all_points)
+TEST(camera_frames_all_points)
 {
     const float points[][3] = {{0, 0, 0}, {1, 0.2f, 0}, {0.3f, -2, 0.5f}, {-0.7f, 0.4f, 1.5f}};
     const float nowhere[3] = {0};
@@ -334,9 +317,8 @@ START_TEST(camera_frames_all_points)
                           elevation, (double)out[0], (double)out[1]);
         }
 }
-END_TEST
 
-START_TEST(shadings_are_found_by_name)
+TEST(shadings_are_found_by_name)
 {
     for (int i = 0; drape_shadings[i]; i++) {
         ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, drape_shadings[i]->entry.name),
@@ -346,9 +328,3 @@ START_TEST(shadings_are_found_by_name)
     }
     ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, "lambert"), -1);
 }
-END_TEST
-
-SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp, bodies_are_round_or_crisp,
-      curved_cloth_clears_colliders, hem_lies_inside_the_border, cloth_is_drawn_round_through_its_nodes,
-      texture_is_not_mirrored, ramp_is_even_in_lightness, letters_are_all_there, camera_frames_all_points,
-      shadings_are_found_by_name)

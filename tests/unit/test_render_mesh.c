@@ -27,21 +27,20 @@ static scene cylinder(double radius)
 
 static double *shown(const drape_model *m, const double *x)
 {
-    double *normals = calloc(3 * (size_t)m->node_count, sizeof *normals);
+    scoped_memory double *normals = calloc(3 * (size_t)m->node_count, sizeof *normals);
     double *at = calloc(3 * (size_t)m->surface.node_count, sizeof *at);
     drape_model_normals(m, x, normals);
     drape_model_render_positions(m, -1, x, normals, at);
-    free(normals);
     return at;
 }
 
 /* At rest vertices are where they were given, and a rigid motion of the nodes moves them likewise, to
  * rounding: the binding stops at residuals of 16 units of the last place of 1 m. */
-START_TEST(vertices_follow)
+TEST(vertices_follow)
 {
     static const double radii[] = {0.31, 0.29, 0.3, 0.27};
     for (int r = 0; r < 4; r++) {
-        scene s = cylinder(radii[r]);
+        scoped_scene s = cylinder(radii[r]);
         const drape_model *m = s.model;
         const drape_render_mesh all = drape_model_render_mesh(m, -1), one = drape_model_render_mesh(m, 0);
         ck_assert_int_eq(one.vertex_count, 41 * 30);
@@ -49,7 +48,7 @@ START_TEST(vertices_follow)
         ck_assert_int_eq(all.triangle_count, one.triangle_count + 12);
         ck_assert_int_eq(all.triangles[3 * one.triangle_count],
                          drape_model_triangles(m)[3 * 2 * 12 * 8] - 13 * 9 + one.vertex_count);
-        double *at = shown(m, m->rest), *x = calloc(3 * (size_t)m->node_count, sizeof *x);
+        scoped_memory double *at = shown(m, m->rest), *x = calloc(3 * (size_t)m->node_count, sizeof *x);
         for (int i = 0; i < 3 * all.vertex_count; i++)
             ck_assert_double_eq_tol(at[i], all.rest[i], 1e-14);
         free(at);
@@ -65,23 +64,19 @@ START_TEST(vertices_follow)
             for (int k = 0; k < 3; k++)
                 ck_assert_double_eq_tol(at[i + k], want[k], 1e-14);
         }
-        free(at);
-        free(x);
-        scene_close(&s);
     }
 }
-END_TEST
 
 /* A shell above a cylinder that is bent to another radius: from the triangles on both sides of an edge, a
  * place above it is the same, to rounding. With the normals of the triangles there would be a step of the
  * height times the angle of the hinge, 10 mm * 0.15 = 1.5 mm. */
-START_TEST(a_shell_has_no_steps)
+TEST(a_shell_has_no_steps)
 {
-    scene s = cylinder(0.31);
+    scoped_scene s = cylinder(0.31);
     const drape_model *m = s.model;
     const drape_embedded *bound = m->cloths[0].bound;
-    double *x = calloc(3 * (size_t)m->node_count, sizeof *x),
-           *n = calloc(3 * (size_t)m->node_count, sizeof *n);
+    scoped_memory double *x = calloc(3 * (size_t)m->node_count, sizeof *x),
+                         *n = calloc(3 * (size_t)m->node_count, sizeof *n);
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i += 3) {
         const double angle = atan2(m->rest[i + 2], m->rest[i]) * 0.5;
         x[i] = 0.6 * cos(angle);
@@ -112,16 +107,12 @@ START_TEST(a_shell_has_no_steps)
                     }
         }
     ck_assert_int_gt(edges, 1000);
-    free(x);
-    free(n);
-    scene_close(&s);
 }
-END_TEST
 
 /* Values stay within those of the nodes, and are linear in the positions of a flat cloth inside of it. */
-START_TEST(values_are_interpolated)
+TEST(values_are_interpolated)
 {
-    scene s = scene_model(
+    scoped_scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 4, 'width': 0.3,"
         " 'height': 0.3}, 'pins': [{'edge': 'top'}], 'terms': ['stretch.cst'], 'material':"
         " {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'render_mesh': {'grid': 'square',"
@@ -146,13 +137,11 @@ START_TEST(values_are_interpolated)
     }
     for (int t = 0; t < 128; t++)
         ck_assert(triangle[t] >= 0 && triangle[t] < m->triangle_count);
-    scene_close(&s);
 }
-END_TEST
 
 /* A host gives arrays; wrong ones are refused with a place, NULL changes nothing, and any failure of memory
  * leaves nothing behind. */
-START_TEST(of_a_host)
+TEST(of_a_host)
 {
     failing_allocator memory = {0};
     drape_context *ctx = failing_context(&memory);
@@ -167,10 +156,8 @@ START_TEST(of_a_host)
                                       {.name = "thickness", .number = 1e-3},
                                       {.name = "density", .number = 200}};
     const drape_entry_def term = {.type = "stretch.cst"};
-    drape_cloth_def cloth;
-    drape_scene_def def;
-    drape_cloth_def_init(&cloth, sizeof cloth);
-    drape_scene_def_init(&def, sizeof def);
+    drape_cloth_def cloth = cloth_def();
+    drape_scene_def def = scene_def();
     ck_assert(isnan(cloth.render_mesh.max_distance) && cloth.render_mesh.mesh.scale[0] == 1);
     def.cloths = &cloth;
     def.cloth_count = 1;
@@ -241,6 +228,3 @@ START_TEST(of_a_host)
     drape_context_destroy(&ctx);
     ck_assert_int_eq(memory.live, 0);
 }
-END_TEST
-
-SUITE("render_mesh", vertices_follow, a_shell_has_no_steps, values_are_interpolated, of_a_host)

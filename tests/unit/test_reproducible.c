@@ -17,14 +17,13 @@ static bool says(const char *reason)
     return strstr(why, reason) != NULL;
 }
 
-START_TEST(arithmetic_is_that_of_ieee_754)
+TEST(arithmetic_is_that_of_ieee_754)
 {
     ck_assert(!says("IEEE 754"));
     ck_assert(!says("more digits"));
 }
-END_TEST
 
-START_TEST(another_rounding_is_noticed)
+TEST(another_rounding_is_noticed)
 {
     static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
     const uint64_t hash = drape_arithmetic_hash();
@@ -37,7 +36,6 @@ START_TEST(another_rounding_is_noticed)
     }
     ck_assert(drape_arithmetic_hash() == hash && !says("IEEE 754"));
 }
-END_TEST
 
 /* Denormal results become 0, on x86-64; elsewhere arithmetic stays as it is, and nothing is to be noticed. */
 static bool flush_denormals(bool flush)
@@ -51,19 +49,14 @@ static bool flush_denormals(bool flush)
 #endif
 }
 
-START_TEST(lost_denormals_are_noticed)
+TEST(lost_denormals_are_noticed)
 {
     const bool lost = flush_denormals(true), noticed = says("IEEE 754");
     flush_denormals(false);
     ck_assert(noticed == lost);
 }
-END_TEST
 
-START_TEST(powers_of_sundials_are_ours_if_it_is_static)
+TEST(powers_of_sundials_are_ours_if_it_is_static)
 {
     ck_assert(says("SUNDIALS") == SUNDIALS_IS_SHARED);
 }
-END_TEST
-
-SUITE("reproducible", arithmetic_is_that_of_ieee_754, another_rounding_is_noticed, lost_denormals_are_noticed,
-      powers_of_sundials_are_ours_if_it_is_static)

@@ -48,7 +48,7 @@ static const struct {
 #define COUNT (sizeof functions / sizeof *functions)
 
 /* Within the tolerance, on the side of the end, and with two evaluations more than bisection at most. */
-START_TEST(roots_are_enclosed)
+TEST(roots_are_enclosed)
 {
     static const double tolerances[] = {1e-3, 1e-10, 1e-14};
     for (size_t i = 0; i < COUNT; i++)
@@ -63,19 +63,17 @@ START_TEST(roots_are_enclosed)
             ck_assert_int_le(c.calls, (int)ceil(log2(1 / tolerances[k])) + 2);
         }
 }
-END_TEST
 
 /* Smooth functions take far fewer evaluations than the 34 of bisection. */
-START_TEST(smooth_functions_are_quick)
+TEST(smooth_functions_are_quick)
 {
     counted c = {.f = parabola};
     double root;
     ck_assert_int_eq(drape_root_find(call, &c, 0, 0.7, 1, -4.205, 1e-10, &root), DRAPE_OK);
     ck_assert_int_le(c.calls, 12);
 }
-END_TEST
 
-START_TEST(a_root_at_an_end_is_that_end)
+TEST(a_root_at_an_end_is_that_end)
 {
     counted c = {.f = line};
     double root = 0;
@@ -85,16 +83,11 @@ START_TEST(a_root_at_an_end_is_that_end)
     ck_assert_int_eq(drape_root_find(call, &c, 1 / 3.0, 0, 1, 2, 1e-12, &root), DRAPE_OK);
     ck_assert(root > 1 / 3.0 && root <= 1 / 3.0 + 1e-12);
 }
-END_TEST
 
-START_TEST(a_failure_ends_the_search)
+TEST(a_failure_ends_the_search)
 {
     counted c = {.f = parabola, .fails_at = 3};
     double root;
     ck_assert_int_eq(drape_root_find(call, &c, 0, 0.7, 1, -4.205, 1e-10, &root), DRAPE_E_FILE);
     ck_assert_int_eq(c.calls, 3);
 }
-END_TEST
-
-SUITE("root", roots_are_enclosed, smooth_functions_are_quick, a_root_at_an_end_is_that_end,
-      a_failure_ends_the_search)

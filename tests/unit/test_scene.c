@@ -29,9 +29,7 @@ static char *with_quotes(const char *text)
     static char quoted[1 << 16];
     ck_assert_uint_lt(strlen(text), sizeof quoted);
     strcpy(quoted, text);
-    for (char *p = quoted; *p; p++)
-        if (*p == '\'')
-            *p = '"';
+    quote(quoted);
     return quoted;
 }
 
@@ -102,7 +100,7 @@ static void check_vector(const double *vector, double x, double y, double z)
     ck_assert_double_eq(vector[2], z);
 }
 
-START_TEST(test_example_cloth)
+TEST(test_example_cloth)
 {
     open_context();
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
@@ -126,12 +124,11 @@ START_TEST(test_example_cloth)
     check_vector(cloth->velocity, 0, 0, 0.25);
     close_context();
 }
-END_TEST
 
 #define MESH_SCENE(mesh)       "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': " mesh "}]}"
 #define TRANSFORMED(transform) MESH_SCENE("{'file': 'a/b.obj', 'transform': {" transform "}}")
 
-START_TEST(test_transforms)
+TEST(test_transforms)
 {
     open_context();
     ck_assert_int_eq(read_quoted(TRANSFORMED("'translate': [1, 2, 3], 'rotate': [0, 1, 0, 90], 'scale': 2")),
@@ -152,18 +149,15 @@ START_TEST(test_transforms)
     ck_assert_double_eq(def.cloths[0].mesh.rotate[3], 0);
     close_context();
 }
-END_TEST
 
 /* Docstrings of drape/drape.h name these numbers for readers: whoever changes one changes it there too. */
-START_TEST(test_host_defaults)
+TEST(test_host_defaults)
 {
     drape_mesh_def mesh;
-    drape_collider_def collider;
-    drape_pin_def pin;
+    drape_collider_def collider = collider_def();
+    drape_pin_def pin = pin_def();
     drape_scene_def_init(&def, sizeof def);
     drape_mesh_def_init(&mesh, sizeof mesh);
-    drape_collider_def_init(&collider, sizeof collider);
-    drape_pin_def_init(&pin, sizeof pin);
     check_vector(def.gravity, 0, -9.81, 0);
     ck_assert_str_eq(def.integrator.type, "be");
     ck_assert_str_eq(def.controller.type, "halving");
@@ -181,9 +175,8 @@ START_TEST(test_host_defaults)
     ck_assert_double_eq(friction->max, 1000);
     ck_assert_uint_eq(drape_scene_key_at("/colliders")->at_most, 4096);
 }
-END_TEST
 
-START_TEST(test_numbers)
+TEST(test_numbers)
 {
     open_context();
     ck_assert_int_eq(
@@ -203,11 +196,10 @@ START_TEST(test_numbers)
     check_vector(pins[1].box_max, 1, 1, 3);
     close_context();
 }
-END_TEST
 
 /* ---- Comments ---- */
 
-START_TEST(test_comments)
+TEST(test_comments)
 {
     open_context();
     ck_assert_int_eq(read_quoted("\xEF\xBB\xBF// first\r\n{/**/'drape'/* a * / ' */: 1, // 'drape': 2\r\n"
@@ -218,7 +210,6 @@ START_TEST(test_comments)
     ck_assert_str_eq(def.cloths[0].mesh.grid.type, "//");
     close_context();
 }
-END_TEST
 
 /* ---- Places ---- */
 
@@ -268,7 +259,7 @@ static const struct {
     {"drape", false, 2, 1},
 };
 
-START_TEST(test_places)
+TEST(test_places)
 {
     for (size_t i = 0; i < sizeof place_table / sizeof *place_table; i++) {
         const char *text = with_quotes(places);
@@ -280,9 +271,8 @@ START_TEST(test_places)
                       "%s: found %d at %zu:%zu", place_table[i].pointer, found, line, column);
     }
 }
-END_TEST
 
-START_TEST(test_mend_end)
+TEST(test_mend_end)
 {
     const struct {
         const char *text, *mended;
@@ -301,9 +291,8 @@ START_TEST(test_mend_end)
         ck_assert_str_eq(text, table[i].mended);
     }
 }
-END_TEST
 
-/* ---- Wrong scenes ---- */
+/* ---- Wrong scenes: more of them are in tests/bad ---- */
 
 /* Each has its fault in line 2. */
 #define ROOT(members)  "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}],\n" members "}"
@@ -316,20 +305,15 @@ static const struct {
     /* syntax */
     {"", "s.json: the scene is empty"},
     {"'text'", "s.json:1:1: '{' expected near '\"text\"'"},
-    {"[1, 2]", "s.json:1:1: a scene is an object, {...}"},
-    {"{'drape': 1", "s.json:1:12: '}' expected near end of file"},
-    {"{'drape': 1,}", "s.json:1:13: string or '}' expected near '}'"},
     {"{'drape': 1 'duration': 1}", "s.json:1:13: '}' expected near '\"duration\"'"},
     {"{'drape' 1}", "s.json:1:10: ':' expected near '1'"},
     {"{drape: 1}", "s.json:1:2: string or '}' expected near 'drape'"},
     {"{'drape': 1}\n}", "s.json:2:1: end of file expected near '}'"},
     {"{'drape': 1, 'drape': 1}", "s.json:1:14: duplicate object key near '\"drape\"'"},
-    {"{'drape': NaN}", "s.json:1:11: invalid token near 'NaN'"},
     {"{'drape': -Infinity}", "s.json:1:11: invalid token near '-'"},
     {"{'drape': 01}", "s.json:1:11: invalid token near '0'"},
     {"{'drape': +1}", "s.json:1:11: invalid token near '+'"},
     {"{'drape': 1.}", "s.json:1:11: invalid token near '1.'"},
-    {"{'drape': 1,\n 'duration': 1e999}", "s.json:2:14: real number overflow near '1e999'"},
     {"{'drape': 'one\n}", "s.json:1:11: unexpected newline near '\"one'"},
     {"{'drape': 'one", "s.json:1:11: premature end of input near '\"one'"},
     {"{'drape': '\\q'}", "s.json:1:11: invalid escape near '\"\\q'"},
@@ -340,48 +324,22 @@ static const struct {
     {"{'description': '\xc3\xa9\xc0\x80"
      "'}",
      "s.json:1:19: byte 0xc0 is not UTF-8"},
-    {"{ /* open\n 'drape': 1}", "s.json:1:3: this comment is not closed"},
     {"{'drape': 1 /}", "s.json:1:13: '}' expected near '/'"},
     {"{'drape': nul}", "s.json:1:11: invalid token near 'nul'"},
     {"{'drape': True}", "s.json:1:11: invalid token near 'True'"},
     {"{'drape': [1, 2}", "s.json:1:16: ']' expected near '}'"},
     /* the scene */
-    {"{}", "s.json:1:1: /drape: \"drape\" is missing: version of the scene format; the number 1"},
-    {"{'drape': 2, 'newer': 1}", "s.json:1:2: /drape: a scene of version 2; this library reads version 1"},
     {"{'drape': '1'}", "s.json:1:2: /drape: \"1\" is not allowed; drape is the number 1"},
-    {"{'drape': 1}", "s.json:1:1: /cloth: \"cloth\" is missing: the pieces of cloth; an array of objects, at "
-                     "least one, at most 1048576"},
-    {"{'drape': 1, 'cloth': []}", "s.json:1:14: /cloth: an empty array is not allowed; cloth is an array of "
-                                  "objects, at least one, at most 1048576"},
-    {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:1: /duration: \"duration\" is missing: simulated time; a number in (0, 1e9] s"},
     {"{'drape': 1, 'cloth': [1]}", "s.json:1:24: /cloth/0: 1 is not allowed; an element is an object"},
-    {"{'drape': 1, 'cloth': [{}]}",
-     "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
     {"{'drape': 1, 'durration': 1}",
      "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"? Known: <*>"},
     {ROOT("'colliders': 3"),
      "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects, at most 4096"},
-    {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: name of a "
-                                "collider; its parameters are keys beside "
-                                "it; a non-empty string"},
-    {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
-     "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
-    {ROOT("'colliders': [{'type': 's', 'center': [0, '1', 2]}]"),
-     "s.json:2:43: /colliders/0/center/1: \"1\" is not allowed; an element is a number"},
-    {ROOT("'colliders': [{'type': 's', 'track': [[0, [0, 0, 0]], [0, [1, 0, 0]]]}]"),
-     "s.json:2:56: /colliders/0/track/1/0: 0 is not allowed; the time of a key is greater than that of the "
-     "key "
-     "before, 0"},
-    {ROOT("'self_contact': 0.01"),
-     "s.json:2:1: /self_contact: 0.01 is not allowed; self_contact is an object"},
     {ROOT("'output': {'a/b~c': 1}"),
      "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats<*>"},
     {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, <*>"},
     {ROOT("'\xc3\xa9\\n': 1"), "s.json:1:1: /é : unknown key \"é \"; known: drape, <*>"},
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
-    {ROOT("'gravity': 9.81"), "s.json:2:1: /gravity: 9.81 is not allowed; gravity is [x, y, z], each in "
-                              "[-1e9, 1e9] m/s2"},
     {ROOT("'integrator': {'method': 1}"),
      "s.json:2:16: /integrator/method: 1 is not allowed; method is a non-empty string"},
     {ROOT("'controller': {'dt_min': null}"),
@@ -398,18 +356,11 @@ static const struct {
      "numbers"},
     {CLOTH("'terms': 'stretch.edge'"), "s.json:2:1: /cloth/0/terms: \"stretch.edge\" is not allowed; terms "
                                        "is an array of names, or objects with a \"type\""},
-    {CLOTH("'terms': ['']"), "s.json:2:11: /cloth/0/terms/0: \"\" is not allowed; an element is a name, or "
-                             "an object with a \"type\""},
     {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
      "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a non-empty string"},
     {CLOTH("'pins': []}, {'name': 'cloth0', 'mesh': {'grid': 'g'}"),
      "s.json:2:15: /cloth/1/name: \"cloth0\" is the name of another cloth"},
     /* mesh */
-    {MESH("{}"), "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: none"},
-    {MESH("{'edges': 22}"),
-     "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, <*>"},
-    {MESH("{'grid': 'square', 'file': 'x.obj'}"),
-     "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
     {MESH("{'grid': 'g', 'transform': {'translate': 1}}"),
      "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is [x, y, z], each in "
      "(-inf, inf) m"},
@@ -423,14 +374,10 @@ static const struct {
      "in (0, inf)"},
     /* pins */
     {CLOTH("'pins': {}"), "s.json:2:1: /cloth/0/pins: an object is not allowed; pins is an array of objects"},
-    {CLOTH("'pins': [{}]"),
-     "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, corner, edge, row, box is needed; given: none"},
     {CLOTH("'pins': [{'row': 0, 'nodes': [1]}]"), "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, "
                                                   "corner, edge, row, box is needed; given: nodes, row"},
     {CLOTH("'pins': [{'nodes': 1}]"), "s.json:2:11: /cloth/0/pins/0/nodes: 1 is not allowed; nodes is an "
                                       "array, each an integer in [0, 2147483647], at least one"},
-    {CLOTH("'pins': [{'nodes': [0, 1.5]}]"),
-     "s.json:2:24: /cloth/0/pins/0/nodes/1: 1.5 is not allowed; an element is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'row': -1}]"),
      "s.json:2:11: /cloth/0/pins/0/row: -1 is not allowed; row is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'corner': 0}]"), "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is one "
@@ -441,11 +388,6 @@ static const struct {
      "s.json:2:19: /cloth/0/pins/0/box/0: 0 is not allowed; a corner is three numbers, [x, y, z]"},
     {CLOTH("'pins': [{'box': [[0, 0, 0]]}]"), "s.json:2:11: /cloth/0/pins/0/box: an array of 1 is not "
                                               "allowed; box is two corners, [[x, y, z], [x, y, z]], in m"},
-    {CLOTH("'pins': [{'row': 0, 'track': []}]"),
-     "s.json:2:21: /cloth/0/pins/0/track: an empty array is not allowed; track is an array of [time, [x, y, "
-     "z]], in s and m, at least one"},
-    {CLOTH("'pins': [{'row': 0, 'track': [[0]]}]"), "s.json:2:31: /cloth/0/pins/0/track/0: an array of 1 is "
-                                                    "not allowed; a key of a track is [time, [x, y, z]]"},
     {CLOTH("'pins': [{'row': 0, 'track': [['0', [0, 0, 0]]]}]"),
      "s.json:2:32: /cloth/0/pins/0/track/0/0: \"0\" is not allowed; the time of a key is a number"},
     {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0]]]}]"),
@@ -453,7 +395,7 @@ static const struct {
      "[x, y, z]"},
 };
 
-START_TEST(test_wrong_scenes)
+TEST(test_wrong_scenes)
 {
     open_context();
     for (size_t i = 0; i < sizeof wrong_scenes / sizeof *wrong_scenes; i++) {
@@ -467,10 +409,9 @@ START_TEST(test_wrong_scenes)
     ck_assert_int_eq(read_quoted("{'drape': 1}"), DRAPE_E_ARGUMENT);
     close_context();
 }
-END_TEST
 
 /* Long names, keys and strings leave room for the rest of the message, and are cut between characters. */
-START_TEST(test_long_texts)
+TEST(test_long_texts)
 {
     static char name[2000], text[4000];
     open_context();
@@ -489,9 +430,8 @@ START_TEST(test_long_texts)
     }
     close_context();
 }
-END_TEST
 
-START_TEST(test_deep_nesting)
+TEST(test_deep_nesting)
 {
     static char text[200000];
     open_context();
@@ -501,7 +441,6 @@ START_TEST(test_deep_nesting)
     ck_assert_ptr_nonnull(strstr(message(), ": nested too deeply"));
     close_context();
 }
-END_TEST
 
 static uint32_t next_random(uint64_t *state)
 {
@@ -509,22 +448,19 @@ static uint32_t next_random(uint64_t *state)
     return (uint32_t)(*state >> 33);
 }
 
-START_TEST(test_mutations)
+TEST(test_mutations)
 {
     uint64_t state = 2385;
     open_context();
-    char *good = strdup(with_quotes(example)), *text = strdup(good);
+    scoped_memory char *good = strdup(with_quotes(example)), *text = strdup(good);
     for (int i = 0; i < 2000; i++) {
         strcpy(text, good);
         text[next_random(&state) % strlen(good)] = (char)(next_random(&state) % 256);
         if (read_text(text) != DRAPE_OK)
             check_one_line(message());
     }
-    free(good);
-    free(text);
     close_context();
 }
-END_TEST
 
 /* ---- Values that are set ---- */
 
@@ -595,7 +531,7 @@ static const struct {
     {"/duration", "\xff", "a value is UTF-8, this one is not"},
 };
 
-START_TEST(test_sets)
+TEST(test_sets)
 {
     open_context();
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
@@ -612,10 +548,9 @@ START_TEST(test_sets)
     }
     close_context();
 }
-END_TEST
 
 /* Spellings of numbers that people use and JSON does not have. */
-START_TEST(test_set_loose_numbers)
+TEST(test_set_loose_numbers)
 {
     static const struct {
         const char *text;
@@ -630,10 +565,9 @@ START_TEST(test_set_loose_numbers)
     }
     close_context();
 }
-END_TEST
 
 /* A failed set leaves the scene unchanged; of two sets of a key the later one is named. */
-START_TEST(test_set_order)
+TEST(test_set_order)
 {
     open_context();
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
@@ -660,11 +594,10 @@ START_TEST(test_set_order)
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
     close_context();
 }
-END_TEST
 
 /* ---- Faults found by others ---- */
 
-START_TEST(test_locate_fault)
+TEST(test_locate_fault)
 {
     open_context();
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
@@ -679,7 +612,6 @@ START_TEST(test_locate_fault)
     ck_assert_str_eq(message(), "s.json: the mesh is too large");
     close_context();
 }
-END_TEST
 
 /* ---- Files ---- */
 
@@ -698,7 +630,7 @@ static void check_load(const char *path, drape_status expected, const char *text
     ck_assert_str_eq(message(), text);
 }
 
-START_TEST(test_files)
+TEST(test_files)
 {
     char folder[] = "/tmp/drape-scene-XXXXXX";
     ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -729,10 +661,9 @@ START_TEST(test_files)
     ck_assert_int_eq(rmdir("sub") | chdir("/") | rmdir(folder), 0);
     close_context();
 }
-END_TEST
 
 /* The size of a pipe is unknown: the text is read in pieces. */
-START_TEST(test_pipe)
+TEST(test_pipe)
 {
     char folder[] = "/tmp/drape-scene-XXXXXX", path[64];
     ck_assert_ptr_nonnull(mkdtemp(folder));
@@ -755,11 +686,10 @@ START_TEST(test_pipe)
     ck_assert_int_eq(unlink(path) | rmdir(folder), 0);
     close_context();
 }
-END_TEST
 
 /* Members and elements can be removed; a fault in an array that has lost an element names the removal, as the
  * text has its elements at other places. */
-START_TEST(test_remove)
+TEST(test_remove)
 {
     open_context();
     ck_assert_int_eq(
@@ -787,12 +717,11 @@ START_TEST(test_remove)
     drape_scene_destroy(&scene);
     close_context();
 }
-END_TEST
 
 /* ---- Size, locale, memory ---- */
 
 /* A locale with a decimal comma must not affect numbers. */
-START_TEST(test_locale)
+TEST(test_locale)
 {
     comma_begin();
     open_context();
@@ -804,12 +733,11 @@ START_TEST(test_locale)
     comma_end();
     close_context();
 }
-END_TEST
 
 /* Parses, sets, reads: each allocation in turn fails. */
 static drape_status whole_life(drape_context *context)
 {
-    drape_scene *one = NULL;
+    scoped_parsed *one = NULL;
     drape_status status = drape_scene_parse(context, with_quotes(example), "folder/scene.json", &one);
     ck_assert(!status == (one != NULL));
     if (!status)
@@ -818,11 +746,10 @@ static drape_status whole_life(drape_context *context)
         status = drape_scene_set(one, "/integrator/method", "verlet");
     if (!status)
         status = drape_scene_to_def(one, &def);
-    drape_scene_destroy(&one);
     return status;
 }
 
-START_TEST(test_no_memory)
+TEST(test_no_memory)
 {
     failing_allocator counter = {0};
     ctx = failing_context(&counter);
@@ -840,7 +767,6 @@ START_TEST(test_no_memory)
         ck_assert_int_eq(memory.live, 0);
     }
 }
-END_TEST
 
 static long json_calls, json_fail_at, json_live;
 
@@ -860,7 +786,7 @@ static void json_release(void *memory)
 
 /* The same with the memory of jansson, which is malloc's. jansson reports some of its failures (in strings)
  * as wrong syntax: a scene is then refused for the wrong reason, but nothing leaks. */
-START_TEST(test_no_memory_for_json)
+TEST(test_no_memory_for_json)
 {
     open_context();
     json_set_alloc_funcs(json_allocate, json_release);
@@ -881,7 +807,6 @@ START_TEST(test_no_memory_for_json)
     ck_assert_int_gt(memory_count, 0); /* how many jansson distinguishes depends on its random hash seed */
     close_context();
 }
-END_TEST
 
 /* Checks the tables of keys that the reader walks. */
 static void check_form(const drape_scene_object *object)
@@ -900,12 +825,11 @@ static void check_form(const drape_scene_object *object)
     }
 }
 
-START_TEST(test_form)
+TEST(test_form)
 {
     check_form(&drape_form_scene);
     ck_assert_str_eq(drape_form_scene.keys[0].param.name, "drape");
 }
-END_TEST
 
 /* ---- Every key ---- */
 
@@ -1062,15 +986,9 @@ static int check_keys(const drape_scene_object *object, const char *pointer)
     return checked;
 }
 
-START_TEST(test_every_key)
+TEST(test_every_key)
 {
     open_context();
     ck_assert_int_gt(check_keys(&drape_form_scene, ""), 15);
     close_context();
 }
-END_TEST
-
-SUITE("scene", test_example_cloth, test_transforms, test_host_defaults, test_numbers, test_comments,
-      test_places, test_mend_end, test_wrong_scenes, test_long_texts, test_deep_nesting, test_mutations,
-      test_sets, test_set_loose_numbers, test_set_order, test_locate_fault, test_files, test_pipe,
-      test_remove, test_locale, test_no_memory, test_no_memory_for_json, test_form, test_every_key)

@@ -118,7 +118,7 @@ static const struct {
 /* flat: of a flat sheet hardly a pair is looked at. */
 static void search_all(const char *mesh, bool flat)
 {
-    scene s = scene_model(
+    scoped_scene s = scene_model(
         "{'drape': 1, 'cloth': [{'mesh': {%s}, 'terms': ['stretch.edge'], 'material': "
         "{'young_modulus': 1e6, 'poisson_ratio': 0.3, 'thickness': 1e-3, 'areal_density': 0.2}}], "
         "'self_contact': {'thickness': 0.004}, 'duration': 1}",
@@ -159,27 +159,21 @@ static void search_all(const char *mesh, bool flat)
     }
     ck_assert_int_gt(wanted, 500);
     drape_arena_free(&arena);
-    scene_close(&s);
 }
 
-START_TEST(test_square)
+TEST(test_square)
 {
     search_all("'grid': 'square', 'columns': 12, 'rows': 12, 'width': 0.22, 'height': 0.22", true);
 }
-END_TEST
 
-START_TEST(test_irregular)
+TEST(test_irregular)
 {
     search_all("'grid': 'irregular', 'columns': 12, 'rows': 12, 'width': 0.22, 'height': 0.22", false);
 }
-END_TEST
 
 /* Lines between points at rest may leave the cloth, so nothing is certified. */
-START_TEST(test_not_convex)
+TEST(test_not_convex)
 {
     search_all("'grid': 'annulus', 'rows': 5, 'columns': 24, 'inner_radius': 0.05, 'outer_radius': 0.15",
                false);
 }
-END_TEST
-
-SUITE("self_search", test_square, test_irregular, test_not_convex)

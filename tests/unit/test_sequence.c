@@ -40,10 +40,12 @@ static void close_it(reading *r)
     drape_context_destroy(&r->ctx);
 }
 
+#define scoped_reading SCOPED(close_it) reading
+
 static void assert_raised(const frames_folder *f, const drape_sequence_def *def, double first, double second)
 {
-    reading r = read_it(f, def);
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    scoped_reading r = read_it(f, def);
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 3);
     ck_assert_int_eq(r.frames.node_count, 4);
     ck_assert_int_eq(r.mesh.triangle_count, 2);
@@ -53,15 +55,13 @@ static void assert_raised(const frames_folder *f, const drape_sequence_def *def,
         ck_assert_double_eq(r.mesh.x[i], raised[i]);
     ck_assert_double_eq(r.frames.time[0], first);
     ck_assert_double_eq(r.frames.time[1], second);
-    close_it(&r);
 }
 
 static void assert_fault(const frames_folder *f, const drape_sequence_def *def, const char *message)
 {
-    reading r = read_it(f, def);
+    scoped_reading r = read_it(f, def);
     ck_assert_int_lt(r.status, 0);
     ck_assert_msg(strstr(drape_context_message(r.ctx), message), "%s", drape_context_message(r.ctx));
-    close_it(&r);
 }
 
 static void put_float(FILE *file, double x)
@@ -85,7 +85,7 @@ static void write_pc2(const frames_folder *f, const char *name, int32_t points, 
     ck_assert_int_eq(fclose(file), 0);
 }
 
-START_TEST(formats_give_the_same_frames)
+TEST(formats_give_the_same_frames)
 {
     const frames_folder f = frames_folder_make();
     frames_obj(&f, "square.obj", 4, square, 2, two);
@@ -103,19 +103,18 @@ START_TEST(formats_give_the_same_frames)
     assert_raised(&f, &(drape_sequence_def){"a_%03d.obj", NULL, NULL, 10, 0}, 0, 0.1);
     /* the folder itself has the square first, which is the first frame once more */
     reading r = read_it(&f, &(drape_sequence_def){"./", NULL, NULL, 10, 0});
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 4);
     ck_assert_double_eq(r.frames.x[12 + 2], 1);
     close_it(&r);
     r = read_it(&f, &(drape_sequence_def){"square.obj", NULL, NULL, 10, 0});
-    ck_assert_msg(r.status == DRAPE_OK, "%s", drape_context_message(r.ctx));
+    assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 1);
     close_it(&r);
     frames_folder_remove(&f);
 }
-END_TEST
 
-START_TEST(faults_name_file_frame_and_value)
+TEST(faults_name_file_frame_and_value)
 {
     const frames_folder f = frames_folder_make();
     double x[COUNT(raised)];
@@ -175,26 +174,24 @@ START_TEST(faults_name_file_frame_and_value)
                      cases[i].message);
     frames_folder_remove(&f);
 }
-END_TEST
 
 /* Whatever a byte of the header is, and wherever the file ends, reading ends with a status. */
-START_TEST(hostile_headers_are_refused)
+TEST(hostile_headers_are_refused)
 {
     char bytes[] =
         "\x93NUMPY\x01\x00\x40\x00{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 1), }  \n"
         "12345678";
     const size_t size = sizeof bytes - 1;
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_npy_array array;
     const drape_mesh_source source = {"/c/file", "a.npy"};
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     bytes[8] = (char)(size - 8 - 10);
     ck_assert_int_eq(drape_npy_array_parse(ctx, &source, bytes, size, &array), DRAPE_OK);
     for (size_t length = 0; length < size; length++) {
-        char *copy = malloc(length + 1);
+        scoped_memory char *copy = malloc(length + 1);
         memcpy(copy, bytes, length);
         ck_assert_int_eq(drape_npy_array_parse(ctx, &source, copy, length, &array), DRAPE_E_PARSE);
-        free(copy);
     }
     for (size_t i = 0; i < size - 8; i++)
         for (int b = 0; b < 256; b += 5) {
@@ -204,18 +201,16 @@ START_TEST(hostile_headers_are_refused)
                 ck_assert_int_eq(array.shape[0] * array.shape[1] * array.shape[2] * array.item, 8);
             bytes[i] = kept;
         }
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Linear between frames, at rest outside of them; a host's path replaces them and is a cubic, which continues
  * the velocity before it where it has one of its own at its end. */
-START_TEST(points_between_frames_and_on_paths)
+TEST(points_between_frames_and_on_paths)
 {
     double time[] = {1, 2, 4}, x[12], v[12], to[12], w[12];
     drape_sequence frames = {
         .frame_count = 3, .node_count = 4, .x = (double *)(uintptr_t)raised, .time = time};
-    drape_context *ctx = NULL;
+    scoped_context *ctx = NULL;
     drape_deformation d;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_arena arena = drape_arena_of(ctx);
@@ -255,9 +250,4 @@ START_TEST(points_between_frames_and_on_paths)
     drape_deformation_points(&d, 9, x);
     ck_assert_double_eq(x[2], 1);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("sequence", formats_give_the_same_frames, faults_name_file_frame_and_value, hostile_headers_are_refused,
-      points_between_frames_and_on_paths)

@@ -59,7 +59,7 @@ static double lowest(double a, double b, double o)
 /* These conditions are sufficient, as the problem is convex: T and s = C^-1 T - e positive semidefinite, and
  * T : s = 0; the energy is that of C^-1 T. The bounds are rounding times the condition of C, which is 1e4 at
  * most beside Poisson's ratio: 1e-16 1e4/(1 - .95^2) = 1e-11. */
-START_TEST(the_stress_is_that_of_the_minimum)
+TEST(the_stress_is_that_of_the_minimum)
 {
     int of[3] = {0};
     for (int k = 0; k < LAWS; k++) {
@@ -85,12 +85,11 @@ START_TEST(the_stress_is_that_of_the_minimum)
     for (int k = 0; k < 3; k++)
         ck_assert_int_ge(of[k], LAWS);
 }
-END_TEST
 
 /* Central differences with a step d of 1e-6 of the strain: their error is d^2 times the third derivative,
  * some 1e-12 over the square of the distance from another state, and rounding 1e-16/1e-6 times the condition
  * of the law. States with another one within 3 % of the strain are left out: the second derivative jumps. */
-START_TEST(its_derivatives_are_exact)
+TEST(its_derivatives_are_exact)
 {
     int compared = 0;
     for (int k = 0; k < LAWS; k++) {
@@ -127,10 +126,9 @@ START_TEST(its_derivatives_are_exact)
     }
     ck_assert_int_ge(compared, LAWS * STRAINS);
 }
-END_TEST
 
 /* E h in tension along 1 alone: of the strain e1, with e2 below -nu e1, T11 = E h e1. */
-START_TEST(an_isotropic_sheet_wrinkles_under_uniaxial_tension)
+TEST(an_isotropic_sheet_wrinkles_under_uniaxial_tension)
 {
     const double nu = 0.3, a = 1 / (1 - nu * nu);
     const double c[9] = {a, nu * a, 0, nu * a, a, 0, 0, 0, (1 - nu) / 2 * a};
@@ -147,7 +145,3 @@ START_TEST(an_isotropic_sheet_wrinkles_under_uniaxial_tension)
     drape_tension_relax(c, (double[]){0, 0, 0}, &r);
     ck_assert_int_eq(r.state, DRAPE_TAUT); /* a sheet at rest has its stiffness */
 }
-END_TEST
-
-SUITE("tension", the_stress_is_that_of_the_minimum, its_derivatives_are_exact,
-      an_isotropic_sheet_wrinkles_under_uniaxial_tension)

@@ -38,13 +38,6 @@ static void enter_twice(void *user, int64_t task)
     enter(user, task);
 }
 
-static drape_context *open_context(void)
-{
-    drape_context *ctx = NULL;
-    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    return ctx;
-}
-
 static void check_loop(drape_pool *pool, ledger *l, int64_t sign, int tasks)
 {
     const bool twice = sign % 2;
@@ -57,10 +50,10 @@ static void check_loop(drape_pool *pool, ledger *l, int64_t sign, int tasks)
     }
 }
 
-START_TEST(every_task_runs_once)
+TEST(every_task_runs_once)
 {
     static ledger l;
-    drape_context *ctx = open_context();
+    scoped_context *ctx = make_context();
     drape_arena arena = drape_arena_of(ctx);
     for (int threads = 1; threads <= 5; threads++) {
         drape_pool *pool = NULL;
@@ -73,9 +66,7 @@ START_TEST(every_task_runs_once)
         ck_assert_ptr_null(pool);
     }
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Between two loops the helpers fall asleep; the next loop wakes them. Each of the two tasks lasts until
  * another thread has begun the other one, so the loop would not end without a helper. */
@@ -89,9 +80,9 @@ static void meet(void *user, int64_t task)
         sched_yield();
 }
 
-START_TEST(helpers_that_sleep_are_woken)
+TEST(helpers_that_sleep_are_woken)
 {
-    drape_context *ctx = open_context();
+    scoped_context *ctx = make_context();
     drape_arena arena = drape_arena_of(ctx);
     drape_pool *pool = NULL;
     ck_assert_int_eq(drape_pool_create(&arena, 2, &pool), DRAPE_OK);
@@ -103,9 +94,7 @@ START_TEST(helpers_that_sleep_are_woken)
     }
     drape_pool_destroy(&pool);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* A helper is busy with a task: the caller runs all others meanwhile. The first task that a helper takes
  * waits until all others are done; a pool that assigned tasks to threads beforehand would never end. */
@@ -124,9 +113,9 @@ static void block(void *user, int64_t task)
     atomic_fetch_add(&h->done, 1);
 }
 
-START_TEST(the_caller_does_what_no_helper_takes)
+TEST(the_caller_does_what_no_helper_takes)
 {
-    drape_context *ctx = open_context();
+    scoped_context *ctx = make_context();
     drape_arena arena = drape_arena_of(ctx);
     drape_pool *pool = NULL;
     ck_assert_int_eq(drape_pool_create(&arena, 2, &pool), DRAPE_OK);
@@ -137,9 +126,7 @@ START_TEST(the_caller_does_what_no_helper_takes)
     }
     drape_pool_destroy(&pool);
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
 
 /* Two pools do not affect each other, and a pool serves any thread that calls it. */
 static void *loop_often(void *pool)
@@ -155,9 +142,9 @@ static void *loop_often(void *pool)
     return NULL;
 }
 
-START_TEST(pools_work_beside_each_other)
+TEST(pools_work_beside_each_other)
 {
-    drape_context *ctx = open_context();
+    scoped_context *ctx = make_context();
     drape_arena arena = drape_arena_of(ctx);
     drape_pool *pools[2];
     for (int repeat = 0; repeat < 3; repeat++) {
@@ -175,9 +162,4 @@ START_TEST(pools_work_beside_each_other)
         }
     }
     drape_arena_free(&arena);
-    drape_context_destroy(&ctx);
 }
-END_TEST
-
-SUITE("thread_pool", every_task_runs_once, helpers_that_sleep_are_woken, the_caller_does_what_no_helper_takes,
-      pools_work_beside_each_other)
