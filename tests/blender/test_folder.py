@@ -8,7 +8,7 @@ import sys
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
-from program import SOURCES, equal, run_tests  # pylint: disable=wrong-import-position
+from program import SOURCES, equal, run_tests, text_of, write_text  # pylint: disable=wrong-import-position
 
 sys.path.insert(0, SOURCES + "/blender/drape_cloth")
 from folder import FIRST_PART, MAX_NAME, RECORD, Folder, Owner, Problem, file_name, one_line  # pylint: disable=wrong-import-position
@@ -21,13 +21,11 @@ NAMES = ["Grid", "a\nb", 'q"\'', "$(touch x)`y`", "../up", "..", ".", "", "/etc/
 
 def write(path, text="of the user\n"):
     os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-    with open(path, "w", encoding="utf-8") as file:
-        file.write(text)
+    write_text(path, text)
 
 
 def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
+    return text_of(path)
 
 
 def tree(path="."):

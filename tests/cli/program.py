@@ -141,9 +141,22 @@ def wait_for(condition, child):
         time.sleep(0.002)
 
 
-def read_json(path):
+def text_of(path):
     with open(path, encoding="utf-8") as file:
-        return json.load(file)
+        return file.read()
+
+
+def write_text(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def read_json(path):
+    return json.loads(text_of(path))
+
+
+def write_json(path, data):
+    write_text(path, json.dumps(data))
 
 
 def read_steps(folder):

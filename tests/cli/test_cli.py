@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 
-from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, wait_for, without_warnings, write_scene
+from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, wait_for, without_warnings, write_json, write_scene, write_text
 
 
 
@@ -314,12 +314,10 @@ def test_scene_copy():
     """the folder of a run has a copy of the scene as it was run, with its meshes, and running the copy gives the same bits"""
     os.makedirs("scenes/meshes")
     shutil.copy(SOURCES + "/examples/scenes/tube.obj", "scenes/meshes/tube.obj")
-    with open("scenes/meshes/wedge.obj", "w", encoding="ascii") as file:
-        file.write("v 0 -3 0\nv 1 -3 0\nv 0 -2 0\nv 0 -3 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    write_text("scenes/meshes/wedge.obj", "v 0 -3 0\nv 1 -3 0\nv 0 -2 0\nv 0 -3 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
     whole = scene(mesh={"file": "meshes/tube.obj"}, pins=[{"nodes": [0, 1]}], description='say "\u00e9" \\ \t',
                   colliders=[{"type": "mesh", "file": "meshes/wedge.obj"}])
-    with open("scenes/one.json", "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json("scenes/one.json", whole)
     good("run", "scenes/one.json", "--dt", "0.005", "--out", "a/b")
     kept = read_json("a/b/scene.json")
     equal(kept["integrator"], {"dt": 0.005})
@@ -349,8 +347,7 @@ def test_start_copy():
         file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + values)
     whole = scene()
     whole["cloth"][0]["start"] = {"file": "bent.obj", "velocities": "speed.npy"}
-    with open("scenes/one.json", "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json("scenes/one.json", whole)
     good("run", "scenes/one.json", "--out", "a", "--checkpoint-every", "1")
     kept = read_json("a/scene.json")["cloth"][0]["start"]
     equal(kept, {"file": "scene_mesh_0.obj", "velocities": "scene_mesh_1.npy"})
@@ -765,8 +762,7 @@ def test_scene_of_springs():
     """the scene in docs/springs.md is checked, described and run, below its strain limit"""
     with open(os.path.join(SOURCES, "docs", "springs.md"), encoding="utf-8") as file:
         block = re.search(r"^```json\n(.*?)^```", file.read(), re.S | re.M).group(1)
-    with open("scene.json", "w", encoding="utf-8") as file:
-        file.write(block)
+    write_text("scene.json", block)
     text = good("info", "scene.json")
     for count, word in (480, "structural"), (450, "shear"), (448, "bend"):
         assert re.search(rf"^  spring\.{word} +cloth0 +{count} ", text, re.M), text
@@ -777,8 +773,7 @@ def test_scene_of_springs():
     for word in r"spring\.structural", r"spring\.shear", r"spring\.bend", r"limit\.strain", "assembled":
         assert re.search(rf"^{word} .* ok$", text, re.M), text
     good("run", "scene.json", "--out", "springs", "--duration", "0.5")
-    with open("springs/summary.json", encoding="utf-8") as file:
-        summary = json.load(file)
+    summary = read_json("springs/summary.json")
     assert 0.05 < summary["strain"]["max"] < 0.1 and summary["energy"]["dissipated"] > 0, summary
 
 
@@ -864,8 +859,7 @@ def test_info_of_pins():
     start = {"folds": [{"point": [0.2, 0, 0], "axis": [0, 0, 1], "side": [1, 0, 0], "radius": 0.02}], "spin": [0, 1, 0]}
     rest = [[0, -5, 0], [1, -5, 0], [0, -5, 1], [0, -6, 0]]
     faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-    with open("soft.obj", "w", encoding="utf-8") as file:
-        file.write("".join("v {} {} {}\n".format(*x) for x in rest) + "".join("f {} {} {}\n".format(*(i + 1 for i in f)) for f in faces))
+    write_text("soft.obj", "".join("v {} {} {}\n".format(*x) for x in rest) + "".join("f {} {} {}\n".format(*(i + 1 for i in f)) for f in faces))
     head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 4, 3), }".ljust(117) + b"\n"
     with open("soft.npy", "wb") as file:
         file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + 2 * struct.pack("<12d", *(c for x in rest for c in x)))
@@ -903,8 +897,7 @@ def test_info_of_contact():
                            {"type": "box", "center": [0, 0, 0], "size": 0.05, "track": [[0, [0, 0, 0]], [2, [0, 1, 0]]]},
                            {"type": "mesh", "file": "tetrahedron.obj", "translate": [0, 5, 0]}],
                 self_contact={"thickness": 0.002}, contact={"friction_velocity": 0.01}, histories=[{"name": "pull", "times": [0, 1], "values": [0, 0.5]}])
-    with open("tetrahedron.obj", "w", encoding="utf-8") as file:
-        file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n")
+    write_text("tetrahedron.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n")
     words = good("info", "scene.json")
     for part in (r"\ncolliders\n  floor\n    type +plane\n", r"  normal +\[0, 3, 0\]\n", r"  friction +0\.5\n", r"\n  collider1\n    type +box\n",
                  r"  size +\[0\.05, 0\.05, 0\.05\] m\n", r"  track +\[\[0, \[0, 0, 0\]\], \[2, \[0, 1, 0\]\]\]\n", r"  file +tetrahedron\.obj\n",
@@ -1036,8 +1029,7 @@ def test_schema_and_reader():
     schema = validator()
     for right, one in variants():
         equal(schema.is_valid(one), right, "schema: " + json.dumps(one))
-        with open("scene.json", "w", encoding="utf-8") as file:
-            json.dump(one, file)
+        write_json("scene.json", one)
         result = drape("info", "scene.json")
         equal(result.returncode, 0 if right else 2, json.dumps(one) + result.stderr)
 
@@ -1070,8 +1062,7 @@ def test_cs184():
     """a scene of CS184 runs unchanged, and with another integrator from the command line"""
     pinned = json.loads(re.sub(r"//[^\n]*", "", open(SOURCES + "/examples/scenes/cs184_pinned2.json", encoding="utf-8").read()))
     pinned["cloth"].update(num_width_points=12, num_height_points=12, pinned=[[0, 0], [11, 0]])
-    with open("pinned.json", "w", encoding="utf-8") as file:
-        json.dump(pinned, file)
+    write_json("pinned.json", pinned)
     good("run", "pinned.json", "--duration", "0.2", "--out", "out")
     equal(read_json("out/summary.json")["steps"]["accepted"], 18)
     found = json.loads(good("info", "pinned.json", "--json"))

@@ -7,7 +7,7 @@ import re
 import resource
 import shutil
 
-from program import Skip, drape, equal, good, read_json, run_tests, without_warnings, write_scene
+from program import Skip, drape, equal, good, read_json, run_tests, text_of, without_warnings, write_scene, write_text
 
 SIZES = 0, 1, 100, 700, 3000, 9000  # [bytes] largest size of a file: none, part of the first file, part of later ones
 
@@ -115,8 +115,7 @@ def test_no_folder():
     """a file is where a folder should be"""
     write_scene()
     good("run", "scene.json", "--out", "run", "--format", "npy")
-    with open("file", "w", encoding="ascii") as file:
-        file.write("x")
+    write_text("file", "x")
     commands = [["run", "scene.json", "--out", "file/x"], ["report", "run", "--out", "file/x/page.html"],
                 ["compare", "run", "run", "--out", "file/x/table.csv"]]
     if drape("render", "run", "--out", "x.png", "--size", "64x48").returncode == 0:
@@ -125,8 +124,7 @@ def test_no_folder():
         result = drape(*command)
         assert re.fullmatch(r"[^\n]*file/x[^\n]*Not a directory\n", without_warnings(result.stderr)), (command, result.stderr)
         equal(result.returncode, 1, " ".join(command))
-        with open("file", encoding="ascii") as file:
-            equal(file.read(), "x")
+        equal(text_of("file"), "x")
 
 
 raise SystemExit(run_tests(globals()))

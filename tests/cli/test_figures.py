@@ -12,7 +12,7 @@ import sys
 import xml.etree.ElementTree as tree
 
 from figure import Figure, Text
-from program import Skip, equal, good, run_tests, write_scene
+from program import Skip, equal, good, run_tests, text_of, write_scene, write_text
 
 WIDTH_MM, LEAST_PT = 84, 7
 # Okabe and Ito, Color Universal Design (2008), five more, black and white; the grey of the reference slopes.
@@ -152,14 +152,12 @@ def test_the_check():
     write_scene(duration=0.3)
     good("converge", "scene.json", "--levels", "4", "--integrators", "be,bdf2", "--out", "c")
     check("c/converge_dt.svg")
-    with open("c/converge_dt.svg", encoding="utf-8") as file:
-        source = file.read()
+    source = text_of("c/converge_dt.svg")
     left, top, right, bottom = next(one for one in Figure("c/converge_dt.svg").texts if one.text.startswith("be")).boxes[0]
     for old, new, why in (("</svg>", f'<path style="stroke:rgb(0%,0%,0%);" d="M {left} {bottom} L {right} {top}"/></svg>', "touches the line"),
                           ("83.529412%,36.862745%,0%", "75.294118%,22.352941%,16.862745%", "(192, 57, 43)")):
         assert old in source, old
-        with open("c/converge_dt.svg", "w", encoding="utf-8") as file:
-            file.write(source.replace(old, new))
+        write_text("c/converge_dt.svg", source.replace(old, new))
         try:
             check("c/converge_dt.svg")
         except AssertionError as error:

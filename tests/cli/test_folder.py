@@ -12,7 +12,7 @@ import signal
 import socket
 import subprocess
 
-from program import PROGRAM, SOURCES, Skip, calls_of, drape, equal, good, meddled, read_json, refused, run_tests, scene, signalled, stopped, without_warnings, write_scene
+from program import PROGRAM, SOURCES, Skip, calls_of, drape, equal, good, meddled, read_json, refused, run_tests, scene, signalled, stopped, text_of, without_warnings, write_scene, write_text
 
 LIMIT = 60  # [s]
 MESH = SOURCES + "/tests/bad/good.obj"
@@ -41,8 +41,7 @@ def keeps(folder, *args, says):
 
 
 def put(path, text="mine\n"):
-    with open(path, "w", encoding="ascii") as file:
-        file.write(text)
+    write_text(path, text)
 
 
 def mesh_scene(path, mesh):
@@ -71,8 +70,7 @@ def test_names():
         put("out/" + name)
     good(*RUN, "npy")
     for name in "frame_000000.obj", "positions.glb", "frame_1.npy", "note.txt":
-        with open("out/" + name, encoding="ascii") as file:
-            equal(file.read(), "mine\n", name)
+        equal(text_of("out/" + name), "mine\n", name)
 
 
 def test_own_mesh():
@@ -116,8 +114,7 @@ def test_links():
         os.mkdir(path)
         keeps("out", *RUN, "npy", says="not a regular file")
         os.rmdir(path)
-    with open("mine", encoding="ascii") as file:
-        equal(file.read(), "mine\n")
+    equal(text_of("mine"), "mine\n")
     os.symlink("out", "link")  # the folder itself may be a link: the user named it
     good("run", "scene.json", "--out", "link", "--format", "npy")
 
@@ -250,8 +247,7 @@ def test_planted():
         _, errors = child.communicate(timeout=LIMIT)
     equal(child.returncode, 1, errors)
     assert re.fullmatch(r'drape run: cannot write "out/frame_000003.obj": a file of that name has appeared that Drape did not write\n', without_warnings(errors)), errors
-    with open("out/frame_000003.obj", encoding="ascii") as file:
-        equal(file.read(), "mine\n")
+    equal(text_of("out/frame_000003.obj"), "mine\n")
 
 
 def test_report():
@@ -375,8 +371,7 @@ def test_render():
     os.symlink("x.png", "z.mp4")
     keeps(".", "render", "scene.json", "--out", "z.mp4", *size, says="is a link")
     good("render", "scene.json", "--out", "x.mp4", *size)
-    with open("x.mp4.part", encoding="ascii") as file:
-        equal(file.read(), "mine\n")
+    equal(text_of("x.mp4.part"), "mine\n")
     assert os.path.getsize("x.mp4") > 500
 
 

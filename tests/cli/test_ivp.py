@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 from figure import Figure
-from program import SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene
+from program import SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene, write_text
 
 SET = SOURCES + "/examples/ivp"
 
@@ -146,8 +146,7 @@ def test_bad_input():
     write_npy("cut.npy", shape, numbers[:-1])
     write_npy("nan.npy", shape, (float("nan"), *numbers[1:]))
     write_npy("huge.npy", shape, (*numbers[:242], 1e200, *numbers[243:]))
-    with open("text.npy", "w", encoding="utf-8") as file:
-        file.write("no array")
+    write_text("text.npy", "no array")
     write_scene(duration=0.1, frame_rate=33)
     refused("ivp", "walk", "set/swing.json", says="must be one of run, horizon, reference, score, export")
     refused("ivp", "score", "set/swing.json", says="usage: drape ivp score SCENE POSITIONS.npy")

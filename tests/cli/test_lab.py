@@ -14,7 +14,7 @@ import sys
 import json
 
 from figure import Figure
-from program import PROGRAM, SOURCES, calls_of, claim, drape, equal, good, meddled, read_json, refused, run_tests, scene, wait_for, write_scene
+from program import PROGRAM, SOURCES, calls_of, claim, drape, equal, good, meddled, read_json, refused, run_tests, scene, text_of, wait_for, write_json, write_scene, write_text
 
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
@@ -34,8 +34,7 @@ def lines(folder):
 
 def page_is_alone(path):
     """Checks that the page has pictures and loads nothing from elsewhere."""
-    with open(path, encoding="utf-8") as file:
-        text = file.read()
+    text = text_of(path)
     assert "<figure><img" in text, "no picture"
     equal(re.findall(r'(?:src|href)="(?!data:)[^"]*"', text), [], "what the page wants from elsewhere")
     return text
@@ -205,8 +204,7 @@ def test_plan():
         cases = [json.loads(line) for line in file]
     for case in cases:
         case["case_cpu_s"] = 2 if case["tags"]["integrator"] == "be" else 0.25
-    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    write_text("s/cases.jsonl", "".join(json.dumps(case) + "\n" for case in cases))
     claim("s", "cases.jsonl")
     good(*command, "--plan", "40", "--jobs", "1")
     plan = read_json("s/plan.json")
@@ -286,8 +284,7 @@ def test_axis_completes_the_scene():
     """a scene may lack a value that an axis gives it"""
     whole = scene()
     del whole["cloth"][0]["material"]["density"]
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json("scene.json", whole)
     command = ["stability", "scene.json", "--axis", "/cloth/0/material/density=100:200:2", "--integrators", "be", "--out", "s"]
     good(*command)
     good(*command)
@@ -352,8 +349,7 @@ def test_one_order_is_fitted():
     for case in cases:
         at = sum(moves[:case["case"]])
         case["positions"] = [at] * len(case["positions"])
-    with open("c/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write("".join(json.dumps(case) + "\n" for case in cases))
+    write_text("c/cases.jsonl", "".join(json.dumps(case) + "\n" for case in cases))
     claim("c", "cases.jsonl")
     out = good(*command)
     assert "be: order 1 in dt" in out and "of the last 4 of 6 refinements, as the order of the others is another one" in out, out
@@ -371,8 +367,7 @@ def test_converge_in_space():
     assert re.search(r"^space: order", out, re.M), out
     nodes = [r["nodes"] for r in lines("c").values() if r["tags"]["series"] == "space"]
     equal(sorted(nodes), [16, 49, 169], "nodes")
-    with open("sheet.obj", "w", encoding="utf-8") as file:
-        file.write("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
+    write_text("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
     write_scene(mesh={"file": "sheet.obj"}, pins=[{"nodes": [0]}])
     refused("converge", "scene.json", "--space", "--out", "d", says="refines grids")
 
@@ -447,8 +442,7 @@ def test_validate_goes_on():
     assert table.count("pass") == len(kept) + 1, table  # and "passed" in the last line
     # Saved lines are used: a changed line shows in the table, a line of an unknown case is ignored.
     kept[0]["obtained"] = 2 * kept[0]["expected"]
-    with open("v/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write(json.dumps(kept[0]) + "\n" + json.dumps({**kept[0], "scene_hash": "0"}) + "\n{\"name")
+    write_text("v/cases.jsonl", json.dumps(kept[0]) + "\n" + json.dumps({**kept[0], "scene_hash": "0"}) + "\n{\"name")
     claim("v", "cases.jsonl")
     result = drape("validate", "cantilever", "--json", "--out", "v") if kept[0]["name"] == "cantilever" else None
     rows = json.loads(result.stdout)
@@ -465,8 +459,7 @@ def test_reference_goes_on():
     # A saved level is used unchanged: if its error is small enough there are no further levels.
     about = read_json("t/reference-ida.json")
     about["error_m"] = 1e-12
-    with open("t/reference-ida.json", "w", encoding="utf-8") as file:
-        json.dump(about, file)
+    write_json("t/reference-ida.json", about)
     claim("t", "reference-ida.json")
     good(*command)
     equal(read_json("t/reference.json"), about, "the reference")
@@ -491,8 +484,7 @@ def test_reference_over_budget():
     good(*command, "--budget", "none")
     about = read_json("t/reference.json")
     about.update(method="ida", error_m=None, levels=1, value=1e-5)
-    with open("t/reference-ida.json", "w", encoding="utf-8") as file:
-        json.dump(about, file)
+    write_json("t/reference-ida.json", about)
     os.rename("t/reference.f64", "t/reference-ida.f64")
     for name in os.listdir("t"):
         if name not in ("manifest.jsonl", "reference-ida.json", "reference-ida.f64"):
@@ -534,15 +526,12 @@ def test_torn_line():
     command = ["stability", "scene.json", *AXES, "--integrators", "be", "--out", "s"]
     good(*command)
     whole = lines("s")
-    with open("s/cases.jsonl", encoding="utf-8") as file:
-        text = file.read()
-    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write(text[:-40])
+    text = text_of("s/cases.jsonl")
+    write_text("s/cases.jsonl", text[:-40])
     claim("s", "cases.jsonl")
     good(*command)
     equal(lines("s"), whole, "results")
-    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write("{\n" + text)
+    write_text("s/cases.jsonl", "{\n" + text)
     claim("s", "cases.jsonl")
     result = drape(*command)
     equal((result.returncode, result.stdout), (2, ""), result.stderr)
@@ -553,13 +542,11 @@ def test_other_experiment():
     """a folder with another experiment is left alone"""
     write_scene()
     good("stability", "scene.json", *AXES, "--integrators", "be", "--out", "s")
-    with open("s/experiment.json", encoding="utf-8") as file:
-        before = file.read()
+    before = text_of("s/experiment.json")
     refused("stability", "scene.json", *AXES, "--integrators", "bdf2", "--out", "s", says="another experiment")
     write_scene(duration=0.2)
     refused("stability", "scene.json", *AXES, "--integrators", "be", "--out", "s", says="another experiment")
-    with open("s/experiment.json", encoding="utf-8") as file:
-        equal(file.read(), before, "experiment.json")
+    equal(text_of("s/experiment.json"), before, "experiment.json")
 
 
 def test_wrong_words():
@@ -613,8 +600,7 @@ def test_folder_that_cannot_be_made():
     """an --out that cannot be created is one line and exit code 1 in every verb, with correct input"""
     write_scene()
     good("run", "scene.json", "--out", "run")
-    with open("file", "w", encoding="utf-8") as file:
-        file.write("a file\n")
+    write_text("file", "a file\n")
     verbs = [["run", "scene.json"], ["report", "run"], ["tradeoff", "scene.json"], ["stability", "scene.json", *AXES],
              ["converge", "scene.json"], ["validate", "free_fall"]]
     for verb in verbs:
@@ -636,8 +622,7 @@ PLATE = """{"drape": 1, "cloth": [{"mesh": {"grid": "square", "columns": 7, "row
 
 def test_modes():
     """modes prints a table or JSON, and writes modes.csv with frames of each mode that render draws"""
-    with open("plate.json", "w", encoding="utf-8") as file:
-        file.write(PLATE)
+    write_text("plate.json", PLATE)
     printed = json.loads(good("modes", "plate.json", "--json", "--state", "start"))
     equal([m["kind"] for m in printed["modes"]], ["vibration"] * 6, "kinds")
     out = good("modes", "plate.json", "--state", "start", "--count", "3", "--frames", "4", "--amplitude", "0.1", "--out", "m")
@@ -657,8 +642,7 @@ def test_modes():
     assert 0 < buckling[0]["value"] < buckling[1]["value"] and buckling[0]["kind"] == "buckling", buckling
     refused("modes", "plate.json", "--state", "middle")
     refused("modes", "plate.json", "--state", "start", "--count", "200")
-    with open("slack.json", "w", encoding="utf-8") as file:
-        file.write(PLATE.replace('"bend.midedge", ', ""))
+    write_text("slack.json", PLATE.replace('"bend.midedge", ', ""))
     result = drape("modes", "slack.json", "--state", "start", "--out", "n")
     equal((result.returncode, os.path.exists("n")), (1, False), "modes without stiffness")
     # The free nodes of 4 x 3 have 9 motions across the sheet, none of which has stiffness: any six of them would be arbitrary. Those of 3 x 3 have six.
@@ -705,8 +689,7 @@ def test_no_reference():
     write_scene()
     command = without_reference("--case-seconds", "1e-9", named="case_seconds", not_named="budget")
     os.mkdir("t")
-    with open("t/mine", "w", encoding="utf-8") as file:
-        file.write("kept\n")
+    write_text("t/mine", "kept\n")
     equal(drape(*command, "--case-seconds", "1e-9").returncode, 1, "exit code")
     equal(os.listdir("t"), ["mine"], "what was there before")
     good(*command)
@@ -720,10 +703,8 @@ def test_map_is_labelled():
     assert figure.has("dt [s]") and figure.has("young_modulus [Pa]"), [one.text for one in figure.texts]
     assert not any("1/10" in one.text for one in figure.texts), "rejections in the legend of a map without any"
     # The lines are changed to have rejections: the report is made from the lines alone.
-    with open("s/cases.jsonl", encoding="utf-8") as file:
-        text = file.read()
-    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
-        file.write(text.replace('"rejected":0', '"rejected":3'))
+    text = text_of("s/cases.jsonl")
+    write_text("s/cases.jsonl", text.replace('"rejected":0', '"rejected":3'))
     claim("s", "cases.jsonl")
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     figure = Figure("s/map_be.svg")

@@ -6,7 +6,6 @@ the machine lacks what they need (an OpenGL driver, ffmpeg, Xvfb, numpy). With G
 """
 import functools
 import glob
-import json
 import os
 import shutil
 import signal
@@ -16,7 +15,7 @@ import sys
 import time
 import zlib
 
-from program import LIMIT, PROGRAM, Skip, catches, drape, equal, good, run_tests
+from program import LIMIT, PROGRAM, Skip, catches, drape, equal, good, read_json, run_tests, write_json, write_text
 
 try:
     import numpy
@@ -47,8 +46,7 @@ def write_scene(name="ball.json", **changes):
         (cloth if key in cloth else whole)[key] = value
     for key in [key for key, value in whole.items() if value is None]:
         del whole[key]
-    with open(name, "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json(name, whole)
     return name
 
 
@@ -200,11 +198,9 @@ def test_render_mesh():
     for name, mesh in ("plain", None), ("same", whole), ("half", half):
         scene = write_scene()
         if mesh:
-            with open(scene, encoding="utf-8") as file:
-                data = json.load(file)
+            data = read_json(scene)
             data["cloth"][0]["render_mesh"] = mesh
-            with open(scene, "w", encoding="utf-8") as file:
-                json.dump(data, file)
+            write_json(scene, data)
         good("run", scene, "--out", name)
         pictures.append(render(name, "--camera", "0,89.9", "--shade", "normals", out=name + ".png").astype(int))
     plain, same, half = pictures
@@ -406,8 +402,7 @@ def test_folder():
     assert (read_png("frames/frame_00000.png") != read_png("frames/frame_00005.png")).any()
     others = ["frame_000000.obj", "frame_0001.png", "frames.png", "my_frame_00001.png"]
     for name in others:
-        with open("frames/" + name, "w", encoding="utf-8") as file:
-            file.write("mine")
+        write_text("frames/" + name, "mine")
     good("render", "ball.json", "--out", "frames", "--size", "160x100", "--every", "2")  # as from a longer run: 0, 2, 4
     equal(sorted(os.listdir("frames")), sorted(others + ["manifest.jsonl"] + [f"frame_{k:05}.png" for k in range(3)]))
 
@@ -493,8 +488,7 @@ def test_no_ffmpeg():
     one_line(drape("render", write_scene(), "--out", "x.mp4", env={**os.environ, "PATH": os.path.abspath("bin")}), 2, "ffmpeg")
     for script, says in (("echo first; echo 'no such codec' >&2; exit 3", "no such codec"), ("exit 4", "exit code 4"),
                          ("kill -9 $$", "signal 9")):
-        with open("bin/ffmpeg", "w", encoding="utf-8") as file:
-            file.write("#!/bin/sh\n" + script + "\n")
+        write_text("bin/ffmpeg", "#!/bin/sh\n" + script + "\n")
         os.chmod("bin/ffmpeg", 0o755)
         path = os.path.abspath("bin") + ":" + os.environ["PATH"]
         one_line(drape("render", "ball.json", "--out", "x.mp4", env={**os.environ, "PATH": path}), 1, says)
@@ -579,12 +573,10 @@ def test_view():
     """a window starts paused, runs, steps, drags a node, changes integrator, step and shading, and quits"""
     need_pictures()
     write_scene(colliders=None, contact=None, duration=5, frame_rate=60, pins=[{"corner": "top-left"}, {"corner": "top-right"}])
-    with open("ball.json", encoding="utf-8") as file:
-        scene = json.load(file)
+    scene = read_json("ball.json")
     scene["cloth"][0]["pins"] = [{"corner": "top-left"}, {"corner": "top-right"}]
     scene.pop("pins", None)
-    with open("ball.json", "w", encoding="utf-8") as file:
-        json.dump(scene, file)
+    write_json("ball.json", scene)
     with Screen() as screen:
         view = subprocess.Popen([PROGRAM, "view", "ball.json", "--size", "640x480", "--shade", "diffuse"], env=screen.env, text=True,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE)

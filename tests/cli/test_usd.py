@@ -2,14 +2,13 @@
 """test_usd.py: frames in the format `usd`, read by the grammar of .usda files (OpenUSD, textFileFormat), and compared with the positions in `npy`.
 
 The parser here knows the part of the grammar that layers of meshes need, and nothing else: whatever is not in it is an error."""
-import json
 import math
 import os
 import re
 import signal
 import struct
 
-from program import SOURCES, equal, good, read_npy, refused, run_tests, scene, signalled, write_scene
+from program import SOURCES, equal, good, read_npy, refused, run_tests, scene, signalled, text_of, write_json, write_scene
 
 TOKEN = re.compile(r"""\s+|\#[^\n]*|(?P<asset>@[^@\n]*@)|(?P<path></[\w/]*(?:\.[\w:]+)?>)|(?P<text>"(?:[^"\\\n]|\\.)*")
     |(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[A-Za-z_]\w*(?::\w+)*(?:\.(?:connect|timeSamples))?)|(?P<sign>[()\[\]{}=,:])""", re.X)
@@ -210,8 +209,7 @@ def bodies_scene(up="y", **changes):
         {"type": "box", "center": [9, 3, 0], "size": [1, 2, 3], "turns": [{"time": 0, "rotate": [0, 0, 1, 0]}, {"time": 0.1, "rotate": [0, 0, 1, 90]}]},
         {"type": "plane", "point": [0, -9, 0], "normal": [0, 1, 0]},
         {"type": "animated_mesh", "file": scenes + "limb.npy", "mesh": scenes + "limb.obj", "frame_rate": 8, "track": [[0, [9, -5, 0]]]}]
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json("scene.json", whole)
 
 
 def test_cloth():
@@ -333,8 +331,7 @@ def test_grammar_is_strict():
     """the parser of this test finds what is wrong in a file: braces, commas, tuples, names and paths"""
     bodies_scene()
     good("run", "scene.json", "--out", "out", "--format", "usd")
-    with open("out/positions.usda", encoding="utf-8") as file:
-        text = file.read()
+    text = text_of("out/positions.usda")
     Usda(text)
     changes = [("#usda 1.0", "#usda"), ("def Xform \"run\"\n{", "def Xform \"run\"\n"), ("2: [(", "2 [("), ("def Scope", "define Scope"),
                ("2: [(", "0: [("), ("), (", ") ("), ("upAxis", "up"), ("</run/materials/cloth>", "<run/materials/cloth"), ("\"light_denim\"", "\"light denim\""),

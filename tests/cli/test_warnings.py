@@ -3,7 +3,7 @@
 import re
 import sys
 
-from program import SOURCES, drape, equal, good, read_json, run_tests, scene, write_scene
+from program import SOURCES, drape, equal, good, read_json, run_tests, scene, text_of, write_scene, write_text
 
 FINE = {"duration": 0.3, "integrator": {"dt": 0.01}}  # 30 steps
 
@@ -107,8 +107,7 @@ def test_few_steps():
 
 def test_large_mesh():
     """a mesh from a file that is more than 20 m across has a warning that names the file; its advice helps"""
-    with open("cape.obj", "w", encoding="utf-8") as file:
-        file.write("v 0 0 0\nv 115 0 0\nv 0 3 0\nf 1 2 3\n")
+    write_text("cape.obj", "v 0 0 0\nv 115 0 0\nv 0 3 0\nf 1 2 3\n")
     for transform, there in (({}, True), ({"scale": 0.01}, False)):
         write_scene(**FINE, mesh={"file": "cape.obj", "transform": transform}, pins=[])
         found = warnings("scene.json")
@@ -129,7 +128,7 @@ def test_inside():
     # The whole sheet, a metre wide at most, is inside a ball of 100 m and never leaves it.
     ball = {"type": "sphere", "name": "ball", "center": [0, 0, 0], "radius": 100}
     write_scene(**FINE, colliders=[ball])
-    result = drape("run", "scene.json", "--summary", "s.json")
+    result = drape("run", "scene.json", "--duration", "0.01", "--summary", "s.json")
     found = {one["name"]: one["text"] for one in read_json("s.json")["warnings"]}
     free = read_json("s.json")["dofs"] // 3
     for name, verb in (("starts_inside", "start"), ("ends_inside", "end")):
@@ -223,8 +222,7 @@ def test_report():
     write_scene()
     good("run", "scene.json", "--out", "r")
     good("report", "r")
-    with open("r/report.html", encoding="utf-8") as file:
-        assert "few_steps" in file.read()
+    assert "few_steps" in text_of("r/report.html")
 
 
 if __name__ == "__main__":

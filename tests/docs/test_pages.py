@@ -25,7 +25,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
-from program import PROGRAM, SOURCES, Skip, drape, equal, good, run_tests, scene  # noqa: E402  pylint: disable=wrong-import-position
+from program import PROGRAM, SOURCES, Skip, drape, equal, good, read_json, run_tests, scene, text_of, write_json, write_text  # noqa: E402  pylint: disable=wrong-import-position
 
 BUILD = os.path.dirname(PROGRAM)
 PAGES = ["README.md", "CONTRIBUTING.md"] + sorted("docs/" + os.path.basename(path) for path in glob.glob(SOURCES + "/docs/*.md"))
@@ -64,8 +64,7 @@ int main(void)
 
 
 def read(page):
-    with open(os.path.join(SOURCES, page), encoding="utf-8") as file:
-        return file.read()
+    return text_of(os.path.join(SOURCES, page))
 
 
 class Block:
@@ -124,8 +123,7 @@ def run_json(block):
         for key in HEADS["cloth"]:
             if key in whole:
                 cloth[key] = whole.pop(key)
-    with open("block.json", "w", encoding="utf-8") as file:
-        json.dump(whole, file)
+    write_json("block.json", whole)
     done([PROGRAM, "check", "block.json"], block.place)
 
 
@@ -133,8 +131,7 @@ def compiled(text, place):
     library = os.path.join(BUILD, "src", "libdrape.so")
     if not os.path.exists(library):
         raise Skip("no shared library in this build")
-    with open("block.c", "w", encoding="utf-8") as file:
-        file.write(text)
+    write_text("block.c", text)
     done(["cc", "-Wall", "-Werror", "-I", SOURCES + "/include", "block.c", library, "-Wl,-rpath," + os.path.dirname(library), "-lm", "-o", "block"], place)
     return done(["./block"], place)
 
@@ -146,8 +143,7 @@ def run_c(page, found):
     if rest:
         functions = [block.text for block in rest if block.text.startswith("static ")]
         inside = ["{\n" + block.text + "}\n" for block in rest if not block.text.startswith("static ")]
-        with open("scene.json", "w", encoding="utf-8") as file:
-            file.write(FRAME_SCENE)
+        write_text("scene.json", FRAME_SCENE)
         output += compiled(FRAME % ("".join(functions), "".join(inside)), page)
     for words in PRINTS.get(page, []):
         assert words in output, f"{page}: its programs do not print {words!r}:\n{output}"
@@ -205,8 +201,7 @@ RUN = {"sh": run_sh, "json": run_json, "text": run_text, "python": run_python}
 def prepare():
     """Prepares the folder in which the blocks of a page run."""
     for name in "SCENE", "scene.json":
-        with open(name, "w", encoding="utf-8") as file:
-            json.dump(scene(), file)
+        write_json(name, scene())
     good("run", "SCENE", "--out", "RUN")
     shutil.copytree(SOURCES + "/examples", "examples", ignore=shutil.ignore_patterns("__pycache__"))
 
@@ -278,7 +273,14 @@ def test_the_net():
 
 def test_blocks():
     """every block of code is run, or says why it is not"""
-    os.environ["PATH"] = BUILD + os.pathsep + os.environ["PATH"]
+    os.mkdir("bin")  # pictures of the pages are small: most of the time of a page is that of drawing
+    write_text("bin/drape", f"""#!/bin/bash
+[ "$1" != render ] || [[ " $*" == *" --size"* ]] || set -- "$@" --size 160x90
+[ "$1" != render ] || for one; do shift; [[ $one =~ ^[0-9]+x[0-9]+$ ]] && one=160x90; set -- "$@" "$one"; done
+exec {PROGRAM} "$@"
+""")
+    os.chmod("bin/drape", 0o755)
+    os.environ["PATH"] = os.path.abspath("bin") + os.pathsep + os.environ["PATH"]
     total, failed = {"run": 0, "marked": 0, "skipped": 0}, []
     for page in PAGES:
         try:
@@ -318,8 +320,7 @@ def test_tables():
     equal(checked(SOURCES), "")
     for name in "bench", "docs", "examples":
         os.symlink(os.path.join(SOURCES, name), name)
-    with open("README.md", "w", encoding="utf-8") as file:
-        file.write(re.sub(r"\| [0-9.]+ mm", "| 1 mm", read("README.md")))
+    write_text("README.md", re.sub(r"\| [0-9.]+ mm", "| 1 mm", read("README.md")))
     equal(checked(os.getcwd()), "tools/tables: README.md: out of date: run tools/tables\n")
 
 
@@ -401,11 +402,9 @@ def test_summary():
     page = read("docs/output.md")
     with open(SOURCES + "/src/io/summary.c", encoding="utf-8") as file:
         wanted = set(re.findall(r'(?:\{|with\(\w+(?:\(\))?, )"([a-z_]\w*)"', file.read()))
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(scene(), file)
+    write_json("scene.json", scene())
     good("run", "scene.json", "--out", "out", "--realtime", "--integrator", "newton_k")
-    with open("out/summary.json", encoding="utf-8") as file:
-        summary = json.load(file)
+    summary = read_json("out/summary.json")
     for key, value in summary.items():
         wanted |= {key, *(value if isinstance(value, dict) else [])}
     for name in "steps.csv", "energy.csv":

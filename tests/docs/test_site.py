@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
-from program import SOURCES, Skip, run_tests  # noqa: E402  pylint: disable=wrong-import-position
+from program import SOURCES, Skip, run_tests, text_of, write_text  # noqa: E402  pylint: disable=wrong-import-position
 
 
 def site(sources):
@@ -73,19 +73,15 @@ def test_undocumented():
     breaks = {"include/drape/drape.h": ("DRAPE_C_END", "DRAPE_API void drape_undocumented(void);\n\nDRAPE_C_END", "drape_undocumented"),
               "include/drape/lab.h": ("typedef struct drape_lab_outcome {", "typedef struct drape_lab_outcome {\n    int bare;\n", "bare"),
               "docs/index.md": ("# Drape: the pages", "# Drape: the pages\n\n[nowhere](lab.md#nowhere)", "page_lab_nowhere")}
-    for part in "docs", "include", "tools", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "src/README.md", "meson.build":
-        source, target = os.path.join(SOURCES, part), os.path.join("copy", part)
-        os.makedirs(os.path.dirname(target), exist_ok=True)
-        if os.path.isdir(source):
-            shutil.copytree(source, target, ignore=shutil.ignore_patterns("images", "__pycache__"))
-        else:
-            shutil.copy(source, target)
+    for part in "docs/make", "include", "tools":
+        shutil.copytree(os.path.join(SOURCES, part), os.path.join("copy", part), ignore=shutil.ignore_patterns("__pycache__"))
+    for part in "docs/index.md", "docs/lab.md", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "meson.build":
+        shutil.copy(os.path.join(SOURCES, part), os.path.join("copy", part))
+    os.mkdir("copy/docs/images")
     for path, (place, instead, _) in breaks.items():
-        with open(os.path.join("copy", path), encoding="utf-8") as file:
-            text = file.read()
+        text = text_of(os.path.join("copy", path))
         assert place in text, path
-        with open(os.path.join("copy", path), "w", encoding="utf-8") as file:
-            file.write(text.replace(place, instead, 1))
+        write_text(os.path.join("copy", path), text.replace(place, instead, 1))
     made = site(os.path.abspath("copy"))
     assert made.returncode not in (0, 77), made.returncode
     for path, (_, _, word) in breaks.items():

@@ -14,7 +14,7 @@ import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "cli"))
-from program import LIMIT, PROGRAM, Skip, equal, run_tests, signalled  # noqa: E402  pylint: disable=wrong-import-position
+from program import LIMIT, PROGRAM, Skip, equal, run_tests, signalled, text_of, write_json  # noqa: E402  pylint: disable=wrong-import-position
 
 PYTHON = "/usr/bin/python3"  # Debian's python3, for which its packages are made
 FORMATS = "npy,obj,ply,vtp,pc2,glb,usd"
@@ -71,8 +71,7 @@ def read_blender(folder, *args, script="read_blender.py"):
 
 
 def run(folder, *args, scene=None):
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(scene or SCENE, file)
+    write_json("scene.json", scene or SCENE)
     result = subprocess.run([PROGRAM, "run", "scene.json", "--out", folder, "--format", FORMATS, *args],
                             capture_output=True, text=True, timeout=LIMIT, check=False)
     assert result.returncode == 0, result.stderr
@@ -159,8 +158,7 @@ def test_render_mesh():
     subprocess.run([PROGRAM, "run", "napkin.json", "--out", "napkin", "--format", "obj,usd,glb,npy", "--duration", "0.04"], check=True, capture_output=True)
     own, frame = faces_of_obj("napkin.obj"), faces_of_obj("napkin/frame_000002.obj")
     assert len(own) == 16 * 16 + 2 and own == frame
-    with open("napkin/positions.usda", encoding="utf-8") as file:
-        text = file.read()
+    text = text_of("napkin/positions.usda")
     assert text.count("def GeomSubset") == 2 and "primvars:st" in text
     try:
         validate_gltf("napkin")
@@ -183,8 +181,7 @@ def test_z_up():
 
 def test_killed():
     """a killed run leaves readable files with all frames so far"""
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(SCENE, file)
+    write_json("scene.json", SCENE)
     equal(signalled(signal.SIGKILL, "frame_000012.vtp", "--format", FORMATS, "--duration", "2"), -signal.SIGKILL)
     done = 0
     for check in (lambda: read_numpy("out", "y", "killed"), lambda: read_vtk("out", "y", "killed"), lambda: validate_gltf("out")):
@@ -199,8 +196,7 @@ def test_killed():
 
 def test_full_disk():
     """a run on a full disk does too: no file is longer than 300 kB"""
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(SCENE, file)
+    write_json("scene.json", SCENE)
     for one in FORMATS.split(","):
         result = subprocess.run(["/bin/sh", "-c", 'ulimit -f 600; exec "$0" "$@"', PROGRAM, "run", "scene.json", "--out", one, "--format",
                                  one, "--duration", "20"], capture_output=True, text=True, timeout=LIMIT, check=False)

@@ -16,7 +16,7 @@ import sys
 import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
-from program import LIMIT, PROGRAM, Skip, drape, good, read_npy, run_tests  # noqa: E402  pylint: disable=wrong-import-position
+from program import LIMIT, PROGRAM, Skip, drape, good, read_npy, run_tests, text_of, write_json, write_text  # noqa: E402  pylint: disable=wrong-import-position
 
 TRICK = "quotes \" and ' and </script><script>throw Error('markup')</script> <!-- and \u00e9"
 
@@ -40,14 +40,12 @@ def refused(*args, code=2, says=""):
 
 
 def make_run(*args, folder="out", scene=None):
-    with open("scene_of_test.json", "w", encoding="utf-8") as file:
-        json.dump(scene or SCENE, file)
+    write_json("scene_of_test.json", scene or SCENE)
     good("run", "scene_of_test.json", "--out", folder, *args)
 
 
 def read(path):
-    with open(path, encoding="utf-8") as file:
-        return file.read()
+    return text_of(path)
 
 
 def block(page, name):
@@ -162,8 +160,7 @@ def test_unfinished():
     make_run()
     os.remove("out/summary.json")
     rows = read("out/energy.csv").splitlines(keepends=True)
-    with open("out/energy.csv", "w", encoding="ascii") as file:
-        file.write("".join(rows[:-1]) + rows[-1][:10])
+    write_text("out/energy.csv", "".join(rows[:-1]) + rows[-1][:10])
     assert "20 of 20 frames" in good("report", "out/")
     assert json.loads(block(read("out/report.html"), "run"))["summary"] is None
 
@@ -179,8 +176,7 @@ def test_refused():
                              ("steps.csv", "a,b\n", 'no column "t"'), ("energy.csv", read("out/energy.csv").splitlines()[0] + "\n", "no row")):
         shutil.rmtree("bad", ignore_errors=True)
         shutil.copytree("out", "bad")
-        with open("bad/" + name, "w", encoding="ascii") as file:
-            file.write(text)
+        write_text("bad/" + name, text)
         refused("report", "bad", says=says)
         assert not any(name.startswith("report") for name in os.listdir("bad")), os.listdir("bad")
     os.remove("bad/positions.npy")
@@ -192,8 +188,7 @@ def test_refused():
     refused("report", "bad", says="less data")
     scene = json.loads(read("out/scene.json"))
     scene["cloth"][0]["mesh"]["rows"] = 8
-    with open("bad/scene.json", "w", encoding="ascii") as file:
-        json.dump(scene, file)
+    write_json("bad/scene.json", scene)
     refused("report", "bad", says="63 nodes, the scene of the folder has 72")
 
 
@@ -212,8 +207,7 @@ def make_deforming_run():
             file.writelines("v %g %g %g\n" % p for p in stretched(amount))
             file.write("f 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n")
     body = {"type": "animated_mesh", "file": "body_%d.obj", "frame_rate": 10, "start": 0.1}
-    with open("scene_of_test.json", "w", encoding="utf-8") as file:
-        json.dump({**SCENE, "colliders": [SCENE["colliders"][1], body]}, file)
+    write_json("scene_of_test.json", {**SCENE, "colliders": [SCENE["colliders"][1], body]})
     good("run", "scene_of_test.json", "--out", "out")
     good("report", "out")
 
@@ -484,8 +478,7 @@ def test_no_view():
     """without WebGL 2 the page says so, and its plots work"""
     make_run()
     good("report", "out")
-    with open("bare.html", "w", encoding="utf-8") as file:
-        file.write(read("out/report.html").replace("<body>", "<body><script>HTMLCanvasElement.prototype.getContext = () => null</script>"))
+    write_text("bare.html", read("out/report.html").replace("<body>", "<body><script>HTMLCanvasElement.prototype.getContext = () => null</script>"))
     with Browser(address("bare.html")) as page:
         page.press("End")
         assert not page.evaluate("element('no-view').hidden") and page.evaluate("state.time") == 0.5

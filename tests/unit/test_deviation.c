@@ -34,7 +34,7 @@ static void deform(const scene *s, double *x, const double field[3][4])
 }
 
 /* Two cloths of four nodes, 3 m x 4 m: diagonals of 5 m. All numbers are exact in binary. */
-START_TEST(values_by_hand)
+TEST(values_by_hand)
 {
     scene s = scene_model(TWO, "a", 2, 2, "parallel", "b", 2, 2, "parallel");
     drape_arena arena = drape_arena_of(s.ctx);
@@ -79,14 +79,13 @@ START_TEST(values_by_hand)
     drape_arena_free(&arena);
     scene_close(&s);
 }
-END_TEST
 
 /* Linear fields are the same at material points of any mesh: sheets of other nodes or triangles, deformed
  * alike, are 0 apart, and those that a translation of 0.5 m separates are 0.5 m apart, at each node.
  * Tolerance: a sum of three products of numbers below 16, and weights that are right to the rounding of
  * positions over an edge of 0.1 m, 1e-14, times gradients below 16 over that edge's 3 m mesh; a node is
  * looked up 1e-6 of an edge off, but compared at itself. */
-START_TEST(material_points)
+TEST(material_points)
 {
     static const double one[3][4] = {{1, 0.5, 0, 1}, {-0.5, 2, 1, 3}, {0.25, 0.125, 1, 0}};
     static const double other[3][4] = {{1, 0.5, 0, 1}, {-0.5, 2, 1, 3.5}, {0.25, 0.125, 1, 0}};
@@ -125,12 +124,11 @@ START_TEST(material_points)
             scene_close(&s[1]);
         }
 }
-END_TEST
 
 /* A ring that is cut along a radius: the nodes of both sides of the cut are at the same places at rest, and
  * each has to find its own side. The ring opens to a spiral, 1 m over its angle. The other mesh has twice the
  * cells, so that all nodes of the coarse one are nodes of it; tolerance as above. */
-START_TEST(sides_of_a_cut)
+TEST(sides_of_a_cut)
 {
 #define RING                                                                                                 \
     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'revolution', 'columns': %d, 'rows': %d, "      \
@@ -160,9 +158,8 @@ START_TEST(sides_of_a_cut)
     scene_close(&coarse);
     scene_close(&fine);
 }
-END_TEST
 
-START_TEST(refusals)
+TEST(refusals)
 {
     static const struct {
         const char *names[2];
@@ -195,6 +192,3 @@ START_TEST(refusals)
     }
     scene_close(&s);
 }
-END_TEST
-
-SUITE("deviation", values_by_hand, material_points, sides_of_a_cut, refusals)
