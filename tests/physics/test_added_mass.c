@@ -276,34 +276,3 @@ TEST(wind_of_a_host)
     }
     assert_below(fabs(numerical[1]), 0.35 * fabs(numerical[0]));
 }
-
-/* ---- Refusals ---- */
-
-static void refused(const char *method, const char *cloth, const char *message)
-{
-    char text[2048], members[256];
-    drape_sim *sim = NULL;
-    scoped_scene s = scene_empty();
-    scoped_parsed *parsed = NULL;
-    scoped_model *model = NULL;
-    snprintf(members, sizeof members, "'gravity': [0, 0, 0], 'integrator': {'method': '%s'}, 'duration': 1",
-             method);
-    snprintf(text, sizeof text, SHEET, "", "", cloth, members);
-    quote(text);
-    ck_assert_int_eq(drape_scene_parse(s.ctx, text, "test", &parsed), DRAPE_OK);
-    ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_create(s.ctx, model, NULL, &sim), DRAPE_E_ARGUMENT);
-    ck_assert_msg(strstr(drape_context_message(s.ctx), message), "%s", drape_context_message(s.ctx));
-}
-
-TEST(refusals)
-{
-    static const char *const others[] = {"midpoint", "ida", "dirk", "radau", "rosenbrock", "verlet"};
-    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
-        refused(
-            others[i], "",
-            "does not step the momentum of the term \"air.added_mass\"; choose one of \"be\", \"bdf2\", ");
-    refused("be",
-            ", 'pins': [{'edge': 'left', 'normal': [0, 1, 0], 'track': [[0, [0, 0, 0]], [1, [0, 1, 0]]]}]",
-            "the term \"air.added_mass\" has momentum, which is not stepped with supports that move");
-}

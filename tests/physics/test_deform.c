@@ -48,15 +48,15 @@ static scene open_sheet(const char *format, ...)
  * by 1e-10 m in a step. */
 TEST(rigid_motion_as_frames)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     double force[2][3];
     write_frames(&f, "up.npy", 3, (const double[]){0.2, 0.2, 0.2}, (const double[]){0, 0.1, 0.1});
-    scene rigid = open_sheet("{'type': 'mesh', 'file': '%s/ball.obj', 'scale': 0.2, 'friction': 0.3,"
-                             " 'track': [[0, [0, 0, 0]], [0.2, [0, 0.1, 0]]]}",
-                             f.path);
-    scene frames = open_sheet("{'type': 'animated_mesh', 'file': '%s/up.npy', 'mesh': '%s/ball.obj',"
-                              " 'frame_rate': 5, 'friction': 0.3}",
-                              f.path, f.path);
+    scoped_scene rigid = open_sheet("{'type': 'mesh', 'file': '%s/ball.obj', 'scale': 0.2, 'friction': 0.3,"
+                                    " 'track': [[0, [0, 0, 0]], [0.2, [0, 0.1, 0]]]}",
+                                    f.path);
+    scoped_scene frames = open_sheet("{'type': 'animated_mesh', 'file': '%s/up.npy', 'mesh': '%s/ball.obj',"
+                                     " 'frame_rate': 5, 'friction': 0.3}",
+                                     f.path, f.path);
     scene_advance(&rigid, 0.3);
     scene_advance(&frames, 0.3);
     const double *x = drape_sim_positions(rigid.sim), *y = drape_sim_positions(frames.sim);
@@ -73,9 +73,6 @@ TEST(rigid_motion_as_frames)
     const drape_energy a = drape_sim_energy(rigid.sim), b = drape_sim_energy(frames.sim);
     ck_assert_double_gt(a.gravity + a.elastic + a.kinetic, 0.01);
     ck_assert_double_eq_tol(a.numerical, b.numerical, 1e-8);
-    scene_close(&rigid);
-    scene_close(&frames);
-    frames_folder_remove(&f);
 }
 
 /*
@@ -87,10 +84,10 @@ TEST(rigid_motion_as_frames)
  */
 TEST(ball_grows_in_a_ball_of_cloth)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const double membrane = 1e5 * 1e-3 / (1 - 0.25), rest = 0.205;
     write_frames(&f, "grow.npy", 2, (const double[]){0.2, 0.21}, (const double[]){0, 0});
-    scene s = scene_open(
+    scoped_scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'file': '%s/ball.obj', 'transform': {'scale': %g}},"
         " 'material': {'young_modulus': 1e5, 'poisson_ratio': 0.25, 'thickness': 1e-3, 'density': 200},"
         " 'terms': ['stretch.cst', {'type': 'damp.kelvin_voigt', 'beta': 0.01}]}],"
@@ -119,8 +116,6 @@ TEST(ball_grows_in_a_ball_of_cloth)
      * the 1/h steps in which it grows, more if they begin later; and what moves at first comes to rest. */
     ck_assert_double_gt(energy.numerical, 0);
     ck_assert_double_lt(energy.numerical, 0.06 * energy.elastic);
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* Sends the ball, in its coordinates, to a size and a height. */
@@ -147,12 +142,12 @@ static scene open_host(const frames_folder *f)
  * bits, and so does another number of threads. */
 TEST(host_sends_points)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_frames(&f, "up.npy", 3, (const double[]){0.2, 0.22, 0.2}, (const double[]){0, 0.05, 0.1});
-    scene frames = open_sheet("{'type': 'animated_mesh', 'file': '%s/up.npy', 'mesh': '%s/ball.obj',"
-                              " 'frame_rate': 10, 'friction': 0.3}",
-                              f.path, f.path);
-    scene host = open_host(&f), again = open_host(&f);
+    scoped_scene frames = open_sheet("{'type': 'animated_mesh', 'file': '%s/up.npy', 'mesh': '%s/ball.obj',"
+                                     " 'frame_rate': 10, 'friction': 0.3}",
+                                     f.path, f.path);
+    scoped_scene host = open_host(&f), again = open_host(&f);
     drape_sim_def def = sim_def();
     def.threads = 3;
     drape_sim_destroy(&again.sim);
@@ -169,7 +164,7 @@ TEST(host_sends_points)
     char path[100];
     snprintf(path, sizeof path, "%s/middle.drape", f.path);
     ck_assert_int_eq(drape_sim_save(host.sim, path), DRAPE_OK);
-    scene restored = open_host(&f);
+    scoped_scene restored = open_host(&f);
     assert_ok(restored.ctx, drape_sim_restore(restored.sim, path));
     scene_advance(&host, 0.2);
     scene_advance(&again, 0.2);
@@ -188,20 +183,15 @@ TEST(host_sends_points)
     ck_assert_int_eq(drape_sim_collider_points(host.sim, 0, p, v), DRAPE_OK);
     ck_assert_double_eq_tol(p[1], 0.35, 1e-12);
     ck_assert_double_eq(v[1], 0); /* after the end of the path it rests */
-    scene_close(&frames);
-    scene_close(&host);
-    scene_close(&again);
-    scene_close(&restored);
-    frames_folder_remove(&f);
 }
 
 /* A host that computes its times as k dt calls a rounding error after the end of the last path: the velocity
  * with which that ended goes on. */
 TEST(velocity_goes_on_from_frame_to_frame)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
-    scene s = open_host(&f);
+    scoped_scene s = open_host(&f);
     static double x[3 * POINTS], v[3 * POINTS];
     for (int k = 1; k < 60; k++) {
         send(&s, 1.0 / 60, 0.2, -2 - k / 60.0, (const double[]){0, -1, 0});
@@ -211,36 +201,31 @@ TEST(velocity_goes_on_from_frame_to_frame)
         }
         scene_advance(&s, k * (1.0 / 60));
     }
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* A rigid collider may take the place of one that a host has deformed. */
 TEST(a_rigid_body_takes_its_place)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
-    scene s = open_host(&f),
-          rigid = open_sheet("{'type': 'mesh', 'file': '%s/ball.obj', 'scale': 0.2}", f.path);
+    scoped_scene s = open_host(&f),
+                 rigid = open_sheet("{'type': 'mesh', 'file': '%s/ball.obj', 'scale': 0.2}", f.path);
     send(&s, 0.1, 0.22, 0.05, NULL);
     scene_advance(&s, 0.1);
     ck_assert_int_eq(drape_sim_change_model(s.sim, rigid.model), DRAPE_OK);
     scene_advance(&s, 0.2);
     ck_assert_double_eq_tol(drape_sim_collider(s.sim, 0).velocity[1], 0, 1e-15);
-    scene_close(&s);
-    scene_close(&rigid);
-    frames_folder_remove(&f);
 }
 
 TEST(faults_of_a_host)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     static double x[3 * POINTS], v[3 * POINTS];
     static int triangle[3 * TRIANGLES];
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
-    scene s = open_sheet("{'type': 'animated_mesh', 'file': '%s/ball.obj', 'scale': 0.2},"
-                         " {'type': 'sphere', 'center': [5, 0, 0], 'radius': 0.1}",
-                         f.path);
+    scoped_scene s = open_sheet("{'type': 'animated_mesh', 'file': '%s/ball.obj', 'scale': 0.2},"
+                                " {'type': 'sphere', 'center': [5, 0, 0], 'radius': 0.1}",
+                                f.path);
     frames_ball(RINGS, AROUND, x, triangle);
     ck_assert_int_eq(drape_model_collider_points(s.model, 0), POINTS);
     ck_assert_int_eq(drape_model_collider_points(s.model, 1), 0);
@@ -284,15 +269,13 @@ TEST(faults_of_a_host)
     ck_assert_int_eq(drape_sim_deform_collider(s.sim, 0, 1, POINTS, x, NULL), DRAPE_E_ARGUMENT);
     ck_assert_msg(strstr(drape_context_message(s.ctx), "is degenerate"), "%s", drape_context_message(s.ctx));
     ck_assert_int_eq(drape_sim_collider_points(s.sim, 1, x, NULL), DRAPE_E_ARGUMENT);
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* A body that turns inside out, here in its third frame, is refused with the file and the frame; an open
  * one has no inside. A number that is not finite is found in any frame. */
 TEST(later_frames_are_checked)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const struct {
         double size;
         const char *open, *message;
@@ -318,14 +301,13 @@ TEST(later_frames_are_checked)
                               strstr(drape_context_message(s.ctx), "/colliders/0/file"),
                           "%s", drape_context_message(s.ctx));
     }
-    frames_folder_remove(&f);
 }
 
 /* The inside of a body that intersects itself: two balls of one mesh that overlap wind twice around what they
  * share. A bowl has no inside, but for those that say it is open. */
 TEST(inside_by_winding)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     static double x[6 * POINTS];
     static int triangle[6 * TRIANGLES];
     frames_ball(RINGS, AROUND, x, triangle);
@@ -336,7 +318,7 @@ TEST(inside_by_winding)
     frames_obj(&f, "two.obj", 2 * POINTS, x, 2 * TRIANGLES, triangle);
     char text[300];
     snprintf(text, sizeof text, "{'type': 'animated_mesh', 'file': '%s/two.obj'}", f.path);
-    scene s = scene_model(SHEET, text);
+    scoped_scene s = scene_model(SHEET, text);
     const drape_collider *c = &s.model->colliders[0];
     const drape_collider_pose pose = {.t = 0};
     const double inside[][3] = {{0.4, 0.1, 0}, {0, 0, 0}, {0.8, 0, 0}, {0.4, 0.7, 0.1}, {-0.9, 0, 0}},
@@ -347,23 +329,19 @@ TEST(inside_by_winding)
         ck_assert_double_gt(drape_collider_distance(c, &pose, outside[i], n, NULL), 0);
         ck_assert_double_eq_tol(n[0] * n[0] + n[1] * n[1] + n[2] * n[2], 1, 1e-12);
     }
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* Rules of contact for rigid bodies are refused, with the reason. */
 TEST(verlet_is_refused)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     drape_sim_def def = sim_def();
     write_frames(&f, "up.npy", 1, (const double[]){0.2}, (const double[]){0});
-    scene s = open_host(&f);
+    scoped_scene s = open_host(&f);
     drape_sim_destroy(&s.sim);
     def.integrator = "verlet";
     ck_assert_int_eq(drape_sim_create(s.ctx, s.model, &def, &s.sim), DRAPE_E_ARGUMENT);
     ck_assert_msg(
         strstr(drape_context_message(s.ctx), "collider0 is of the type animated_mesh, which deforms"), "%s",
         drape_context_message(s.ctx));
-    scene_close(&s);
-    frames_folder_remove(&f);
 }

@@ -168,7 +168,7 @@ static void carried_to(int triangle, double t, const double *rest, double x[3])
 TEST(pins_follow_a_triangle)
 {
     static const char *const some[] = {"be", "midpoint", "ida", "radau", "newton_k"};
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_ball(&f);
     for (size_t m = 0; m < sizeof some / sizeof *some; m++)
         for (int triangle = 3; triangle < TRIANGLES; triangle += 31) {
@@ -184,7 +184,6 @@ TEST(pins_follow_a_triangle)
             }
             assert_below(largest, 1e-13); /* weights of up to 10 multiply the rounding of 1e-16 m */
         }
-    frames_folder_remove(&f);
 }
 
 /* The nearest triangle of each node, on a body that turns as well, and then on paths of a host: the velocity
@@ -192,12 +191,12 @@ TEST(pins_follow_a_triangle)
  * and the rounding of 1e-16 m over d. */
 TEST(velocities_are_slopes)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const double d = 1e-6, times[] = {0.03, 0.11, 0.16, 0.23, 0.27};
     write_ball(&f);
-    scene s = scene_open(DEFORMING, ", 'attach': 'body'", f.path, f.path,
-                         ", 'turns': [{'time': 0, 'rotate': [0,0,1,0]}, {'time': 0.3, 'rotate': [1,0,1,90]}]",
-                         "be");
+    scoped_scene s = scene_open(
+        DEFORMING, ", 'attach': 'body'", f.path, f.path,
+        ", 'turns': [{'time': 0, 'rotate': [0,0,1,0]}, {'time': 0.3, 'rotate': [1,0,1,90]}]", "be");
     static double p[3 * POINTS], v[3 * POINTS];
     for (size_t k = 0; k < sizeof times / sizeof *times; k++) {
         const drape_motion *motion = drape_system_motion(s.sim->system);
@@ -223,8 +222,6 @@ TEST(velocities_are_slopes)
             assert_below(distance(velocity, slope), d * d / 6 * 1e3 + 10 * 1e-16 / d);
         }
     }
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* ---- Forces ---- */

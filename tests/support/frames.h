@@ -29,6 +29,8 @@ static inline void frames_folder_remove(const frames_folder *f)
     ck_assert_int_eq(system(command), 0);
 }
 
+#define scoped_frames SCOPED(frames_folder_remove) frames_folder
+
 /* The path of a file in the folder, until the next call. */
 static inline const char *frames_path(const frames_folder *f, const char *name)
 {

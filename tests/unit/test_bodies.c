@@ -142,8 +142,8 @@ static double box_distance(const double *x)
 
 TEST(glb_has_colliders_that_move)
 {
-    frames_folder f = frames_folder_make();
-    scene s = bodies_scene(&f, "z"); /* which changes nothing here */
+    scoped_frames f = frames_folder_make();
+    scoped_scene s = bodies_scene(&f, "z"); /* which changes nothing here */
     record(&s, &f, "glb");
     glb g = {.data = file_read(frames_path(&f, "out/positions.glb"), &g.size)};
     json_error_t error;
@@ -225,8 +225,6 @@ TEST(glb_has_colliders_that_move)
     free(x);
     json_decref(g.json);
     free(g.data);
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* ---- VTK ---- */
@@ -260,8 +258,8 @@ static const double *vtp_points(const frames_folder *f, const char *name, size_t
 /* The collection has each collider as a part of each frame; with z up, (x, y, z) is at (x, -z, y). */
 TEST(vtp_has_colliders_as_parts)
 {
-    frames_folder f = frames_folder_make();
-    scene s = bodies_scene(&f, "z");
+    scoped_frames f = frames_folder_make();
+    scoped_scene s = bodies_scene(&f, "z");
     record(&s, &f, "vtp");
     size_t size, count;
     char *pvd = file_read(frames_path(&f, "out/frames.pvd"), &size), *data;
@@ -305,6 +303,4 @@ TEST(vtp_has_colliders_as_parts)
         "'integrator': {'dt': 0.01}, 'duration': 0.1, 'frame_rate': 40}");
     record(&s, &f, "npy");
     ck_assert(!exists(&f, "collider_2.vtp") && !exists(&f, "collider_3_000001.vtp"));
-    scene_close(&s);
-    frames_folder_remove(&f);
 }

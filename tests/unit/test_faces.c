@@ -367,9 +367,9 @@ static void record(scene *s, const frames_folder *f, const char *format)
  * positions. */
 TEST(obj_frames_have_the_faces_of_the_mesh)
 {
-    frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_tube(&f, "tube.obj");
-    scene s = tube_scene(&f);
+    scoped_scene s = tube_scene(&f);
     ck_assert_int_eq(s.model->cloths[0].mesh.triangle_count, 2 * QUADS + 2);
     record(&s, &f, "obj");
     static const char *const frames[] = {"out/frame_000000.obj", "out/frame_000002.obj"};
@@ -394,8 +394,6 @@ TEST(obj_frames_have_the_faces_of_the_mesh)
                          "tube of_cloth.mtl\nother.mtl"); /* without the control character */
         drape_mesh_free(&mesh);
     }
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 static uint32_t word_at(const char *data, size_t at)
@@ -463,9 +461,9 @@ static size_t place(const glb *g, json_int_t accessor, size_t width, json_int_t 
  * downwards; the nodes of the seam have two vertices, and those of the lid one more. */
 TEST(glb_has_texture_coordinates_and_materials)
 {
-    frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_tube(&f, "tube.obj");
-    scene s = tube_scene(&f);
+    scoped_scene s = tube_scene(&f);
     record(&s, &f, "glb");
     glb g = glb_load(&f);
     static const char *const names[] = {"cloth", "light denim", "lining"};
@@ -508,14 +506,12 @@ TEST(glb_has_texture_coordinates_and_materials)
     }
     ck_assert_uint_eq(seen, 3 * (2 * QUADS + 2 + 8));
     glb_free(&g);
-    scene_close(&s);
-    frames_folder_remove(&f);
 }
 
 /* Each failed allocation is reported, by the importer and where vertices are split, and none leaks. */
 TEST(each_allocation_may_fail)
 {
-    frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     write_tube(&f, "tube.obj");
     drape_status status = DRAPE_E_MEMORY;
     for (int n = 1; status; n++) {
@@ -534,5 +530,4 @@ TEST(each_allocation_may_fail)
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
     }
-    frames_folder_remove(&f);
 }

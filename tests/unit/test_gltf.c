@@ -194,7 +194,7 @@ static void assert_point(const reading *r, int frame, int node, double x, double
  * file are four. */
 TEST(nodes_move)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const glb g = make_square();
     write_glb(&f, &g);
     reading r = read_it(&f, 2);
@@ -221,14 +221,13 @@ TEST(nodes_move)
     ck_assert_double_eq(r.frames.time[0], 10);
     assert_point(&r, 0, 2, 2, 2, 0);
     close_it(&r);
-    frames_folder_remove(&f);
 }
 
 /* The node of a skinned mesh does not move it. At half of the spline the weight is 1/2 + 1/8 of the
  * tangent. */
 TEST(skins_and_morph_targets_move)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const glb g = make_skin();
     write_glb(&f, &g);
     reading r = read_it(&f, 2);
@@ -245,7 +244,6 @@ TEST(skins_and_morph_targets_move)
     assert_point(&r, 2, 2, 0.2 * 2 + 0.8, 1, -0.8);
     assert_point(&r, 2, 3, 0, 1, 3);
     close_it(&r);
-    frames_folder_remove(&f);
 }
 
 /* A node that mirrors its mesh turns the triangles, of a skin the joints that move it do; a node above
@@ -264,7 +262,7 @@ TEST(mirrors_turn_triangles)
         {true, "{'children': [1]}", "{'children': [1], 'scale': [-1, 1, 1]}", turned},
         {true, "'translation': [5, 5, 5]", "'scale': [-1, 1, 1]", as_given},
     };
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     for (size_t i = 0; i < COUNT(cases); i++) {
         glb g = cases[i].skin ? make_skin() : make_square();
         replace(&g, cases[i].from, cases[i].to);
@@ -284,7 +282,6 @@ TEST(mirrors_turn_triangles)
     ck_assert_ptr_nonnull(
         strstr(drape_context_message(r.ctx), "frame 3: node 1 mirrors its mesh, and in frame 0"));
     close_it(&r);
-    frames_folder_remove(&f);
 }
 
 /* Numbers of the buffer that are not finite are named. */
@@ -299,7 +296,7 @@ TEST(values_are_finite)
         {true, 48 + 4 * 20, "skin 0: number 20 of its inverse bind matrices is nan; it must be finite"},
         {false, 76, "key 1 is at nan s; times must be within 1e+09 s"},
     };
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     const float nan = NAN;
     for (size_t i = 0; i < COUNT(cases); i++) {
         glb g = cases[i].skin ? make_skin() : make_square();
@@ -310,7 +307,6 @@ TEST(values_are_finite)
         ck_assert_msg(strstr(drape_context_message(r.ctx), cases[i].message), "%s\nfor %s",
                       drape_context_message(r.ctx), cases[i].message);
     }
-    frames_folder_remove(&f);
 }
 
 TEST(faults_name_the_part)
@@ -386,7 +382,7 @@ TEST(faults_name_the_part)
         {true, "'indices': 8", "'indices': 2",
          "accessor 2 (indices): its numbers have the type 5126; unsigned"},
     };
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     for (size_t i = 0; i < COUNT(cases); i++) {
         glb g = cases[i].skin ? make_skin() : make_square();
         if (strstr(cases[i].to, "285"))
@@ -405,14 +401,13 @@ TEST(faults_name_the_part)
     ck_assert_ptr_nonnull(
         strstr(drape_context_message(r.ctx), "20000001 frames of 6 nodes; at most 1000000"));
     close_it(&r);
-    frames_folder_remove(&f);
 }
 
 /* Whatever a byte is, and wherever the file ends, reading ends with a status; under the sanitizers nothing
  * is read outside of it. */
 TEST(hostile_bytes_are_read_or_refused)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     static const char values[] = {0, '9', '-', (char)255};
     for (int kind = 0; kind < 2; kind++) {
         const glb g = kind ? make_skin() : make_square();
@@ -433,5 +428,4 @@ TEST(hostile_bytes_are_read_or_refused)
             bytes[i] = kept;
         }
     }
-    frames_folder_remove(&f);
 }

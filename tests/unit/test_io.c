@@ -942,7 +942,7 @@ TEST(each_allocation_may_fail)
     scoped_world w;
     meter m = {0};
     set_up(&w);
-    drape_context *ctx = metered_context(&m);
+    scoped_context *ctx = metered_context(&m);
     drape_recorder *recorder = NULL;
     const char *formats[32];
     size_t count = 0;
@@ -971,7 +971,6 @@ TEST(each_allocation_may_fail)
     ck_assert(!exists(w.out, "summary.json"));
     drape_recorder_destroy(&recorder);
     ck_assert_int_eq(m.held, 1);
-    drape_context_destroy(&ctx);
 }
 
 /* ---- Summary */

@@ -367,8 +367,8 @@ static void create_piece(const drape_ranks *ranks, void *user)
     failing_allocator memory = {0};
     piece q = open_piece(ranks, s->shared);
     drape_ranks *own = (drape_ranks *)(uintptr_t)ranks;
-    drape_context *ctx = failing_context(&memory);
-    drape_arena *arena = drape_arena_create(ctx);
+    scoped_context *ctx = failing_context(&memory);
+    scoped_arena *arena = drape_arena_create(ctx);
     own->own_blocks = q.ranks.own_blocks;
     own->block = q.block;
     q.p.ranks = own;
@@ -380,8 +380,6 @@ static void create_piece(const drape_ranks *ranks, void *user)
         s->failures = failures == said ? (int)failures : -1;
         s->reached = memory.calls >= memory.fail_at;
     }
-    drape_arena_destroy(&arena);
-    drape_context_destroy(&ctx);
     close_piece(&q);
 }
 

@@ -87,7 +87,7 @@ static void write_pc2(const frames_folder *f, const char *name, int32_t points, 
 
 TEST(formats_give_the_same_frames)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     frames_obj(&f, "square.obj", 4, square, 2, two);
     frames_npy(&f, "a.npy", "(3, 4, 3)", COUNT(raised), raised);
     frames_npy(&f, "times.npy", "(3,)", 3, (const double[]){0, 0.5, 2});
@@ -111,12 +111,11 @@ TEST(formats_give_the_same_frames)
     assert_ok(r.ctx, r.status);
     ck_assert_int_eq(r.frames.frame_count, 1);
     close_it(&r);
-    frames_folder_remove(&f);
 }
 
 TEST(faults_name_file_frame_and_value)
 {
-    const frames_folder f = frames_folder_make();
+    scoped_frames f = frames_folder_make();
     double x[COUNT(raised)];
     frames_obj(&f, "square.obj", 4, square, 2, two);
     frames_obj(&f, "b_0.obj", 4, square, 2, two);
@@ -172,7 +171,6 @@ TEST(faults_name_file_frame_and_value)
     for (size_t i = 0; i < COUNT(cases); i++)
         assert_fault(&f, &(drape_sequence_def){cases[i].file, cases[i].mesh, cases[i].times, 10, 0},
                      cases[i].message);
-    frames_folder_remove(&f);
 }
 
 /* Whatever a byte of the header is, and wherever the file ends, reading ends with a status. */
