@@ -30,7 +30,8 @@ typedef struct accurate {
     drape_deviation apart;
     drape_ladder ladder;
     double end;
-    int64_t most; /* frames */
+    int64_t most;            /* frames */
+    double *largest, *times; /* (most) how far apart the last two runs are until each [1], [s] */
     trial trials[2], *now, *before;
     drape_accuracy *report;
 } accurate;
@@ -80,9 +81,8 @@ static bool compare(accurate *a, double t, int64_t k)
     if (before->frames <= k)
         return true;
     drape_deviation_add(&a->apart, t, a->now->x + n * (size_t)k, before->x + n * (size_t)k);
-    const double error = drape_ladder_error(&a->ladder, largest(a));
-    if (error <= a->ladder.accuracy)
-        a->report->until = t;
+    a->largest[k] = largest(a);
+    a->times[k] = t;
     return largest(a) <= drape_ladder_hopeless(&a->ladder);
 }
 
@@ -91,7 +91,8 @@ static drape_status watch(void *user, const drape_event *event)
     trial *t = user;
     accurate *a = t->of;
     const size_t n = 3 * (size_t)a->model->node_count;
-    if (event->kind == DRAPE_EVENT_ATTEMPT && t == a->now && work_of(t->sim) > a->ladder.rung.most)
+    if (event->kind == DRAPE_EVENT_ATTEMPT && t == a->now && work_of(t->sim) > a->ladder.rung.most &&
+        !(a->apart.frames > 0 && drape_ladder_goes_on(&a->ladder, largest(a))))
         t->rests = t->given_up = true;
     if (event->kind == DRAPE_EVENT_FRAME && t->frames < a->most) {
         memcpy(t->x + n * (size_t)t->frames, event->positions, n * sizeof *t->x);
@@ -135,7 +136,6 @@ static drape_status begin_trial(accurate *a, const drape_sim_def *given)
     a->apart.frames = 0;
     for (int32_t c = 0; c < a->model->cloth_count; c++)
         a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
-    a->report->until = 0;
     if (!status)
         status = a->prepare ? a->prepare(a->user, t->sim, a->report) : DRAPE_OK;
     return status ? status : drape_sim_observe(t->sim, watch, t);
@@ -149,12 +149,14 @@ static void leave_trial(trial *t)
     t->sim->observer_count = 1;
 }
 
-static void fill_report(accurate *a)
+/* What the runs that were made say of the last one; whole: it was not cut short. */
+static void fill_report(accurate *a, bool whole)
 {
     const int32_t c = drape_deviation_worst(&a->apart);
     const drape_deviation_cloth *cloth = &a->apart.cloths[c];
     const drape_apart *most = &cloth->largest;
-    const double share = drape_ladder_error(&a->ladder, 1);
+    const double apart = largest(a),
+                 share = apart > 0 ? drape_ladder_error(&a->ladder, apart, whole) / apart : 1;
     drape_accuracy *r = a->report;
     r->error = a->apart.frames > 0 ? share * most->rms / cloth->diagonal : NAN;
     r->distance = a->apart.frames > 0 ? share * most->rms : NAN;
@@ -163,7 +165,12 @@ static void fill_report(accurate *a)
     r->node = most->node - a->model->cloths[c].first_node;
     r->time = most->time;
     memcpy(r->place, most->place[0], sizeof r->place);
-    r->reached = r->until >= a->end * (1 - ROUNDING);
+    r->until = 0;
+    for (int64_t k = 0; k < a->apart.frames && share * a->largest[k] <= a->ladder.accuracy; k++)
+        r->until = a->times[k];
+    r->reached = whole && a->apart.frames > 0 && share * apart <= a->ladder.accuracy;
+    if (r->reached)
+        r->until = a->end;
 }
 
 static drape_status climb(accurate *a, const drape_sim_def *def)
@@ -181,10 +188,7 @@ static drape_status climb(accurate *a, const drape_sim_def *def)
             return status;
         const bool failed = status && !t->rests;
         const double fraction = (drape_sim_time(t->sim) - before) / a->end;
-        if (!failed && a->apart.frames == t->frames && t->over && t->compares &&
-            drape_ladder_error(&a->ladder, largest(a)) <= a->ladder.accuracy)
-            a->report->until = a->end;
-        fill_report(a);
+        fill_report(a, t->over && !failed && a->apart.frames == t->frames);
         const drape_rung_result result = {.apart = a->apart.frames > 0 ? largest(a) : NAN,
                                           .fraction = fmax(t->over && !failed ? 1 : fraction, ROUNDING),
                                           .work = work_of(t->sim),
@@ -255,6 +259,9 @@ drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, 
     drape_status status = drape_accuracy_check(ctx, model);
     if (!status)
         status = drape_deviation_create(&a.arena, model, model, &a.apart);
+    a.largest = drape_arena_take(&a.arena, (size_t)a.most, sizeof *a.largest);
+    a.times = drape_arena_take(&a.arena, (size_t)a.most, sizeof *a.times);
+    status = status ? status : drape_arena_status(&a.arena);
     if (!status) {
         double size = INFINITY;
         for (int32_t c = 0; c < model->cloth_count; c++)

@@ -9,16 +9,25 @@
 #define LEAST_PARTS   4    /* of the duration */
 #define LEAST_STEP    1e-7 /* of the duration */
 #define FIRST_RTOL    10.0 /* times the accuracy */
+#define LARGEST_RTOL  0.1
 #define LEAST_RTOL    1e-9
-#define CONTROL_SHARE 0.12 /* a tenth of the tolerance leaves about a tenth of the error */
-#define SAME          1.3  /* distances that differ by less do not converge */
-#define LEAST_RATIO   1.41 /* of distances, at order 1/2 and 2 */
-#define MOST_RATIO    4.0
+#define SAME          1.3 /* distances that differ by less do not converge */
+#define MOST_STUCK    2
 #define MOST_HALVINGS 8 /* that are compared with error control */
 
-static double order_of(const drape_rung *rung)
+/* Shares of the distance between a rung and the one before: of halved steps, which leave 1 at order 1 and 1/3
+ * at order 2, and of a tenth of a tolerance; at bodies, and without. A run is told to be further off than it is
+ * rather than nearer. */
+static const double halved_share[2] = {1, 2}, tenth_share[2] = {0.25, 0.5};
+/* Ratios of two distances that are taken at their word: of order 1/2, and at most what halving gains or, of
+ * error control, the tolerance. */
+#define LEAST_RATIO 1.41
+#define TENTH_RATIO 10.0
+
+/* What one halving gains. */
+static double gain(const drape_ladder *l)
 {
-    return rung->share < 1 ? 2 : 1;
+    return l->hits ? 2 : 4;
 }
 
 void drape_ladder_init(drape_ladder *l, const drape_model *m, double size, double accuracy)
@@ -26,30 +35,52 @@ void drape_ladder_init(drape_ladder *l, const drape_model *m, double size, doubl
     const double g = vec3_norm(m->gravity), swing = sqrt(g > 0 ? size / g : 1);
     const bool hits = m->collider_count > 0;
     *l = (drape_ladder){.accuracy = accuracy,
+                        .least_step = LEAST_STEP * m->duration,
+                        .hits = hits,
                         .can_control = !m->has_branches && !m->has_kinetic,
                         .rung = {.method = hits ? "newton_k" : "bdf2",
                                  .key = "dt",
                                  .value = fmin(FIRST_STEP * swing, m->duration / LEAST_PARTS),
-                                 .share = hits ? 1 : 0.5, /* 1/3 at order 2, and 1 at order 1 */
+                                 .share = halved_share[hits],
                                  .most = INFINITY},
-                        .least_step = LEAST_STEP * m->duration,
-                        .before = NAN,
-                        .ratio = NAN};
+                        .fixed_error = NAN,
+                        .trust = 1,
+                        .before = NAN};
 }
 
-double drape_ladder_error(const drape_ladder *l, double apart)
+double drape_ladder_error(const drape_ladder *l, double apart, bool whole)
 {
     double share = l->rung.share;
-    if (!l->rung.controlled && !isnan(l->ratio)) /* Richardson */
-        share = 1 / (fmin(fmax(l->ratio, LEAST_RATIO), MOST_RATIO) - 1);
-    return share * apart;
+    if (whole && !isnan(l->before))
+        share =
+            1 / (fmin(fmax(l->before / apart, LEAST_RATIO), l->rung.controlled ? TENTH_RATIO : gain(l)) - 1);
+    return share * (l->rung.controlled ? 1 : l->trust) * apart;
 }
 
 double drape_ladder_hopeless(const drape_ladder *l)
 {
-    if (l->unpredictable || (!l->rung.controlled && !(l->can_control && !l->gave_up)))
+    if (!l->can_control || l->rung.controlled)
         return INFINITY;
-    return pow(2, order_of(&l->rung)) * l->accuracy / drape_ladder_error(l, 1);
+    return gain(l) * l->accuracy / drape_ladder_error(l, 1, false);
+}
+
+/* Of halving the steps until they are as accurate. */
+static double work_of_halvings(const drape_ladder *l, double error)
+{
+    const double halvings = ceil(log(fmax(error / l->accuracy, 1)) / log(gain(l)));
+    return l->fixed_work * pow(2, 1 + fmin(halvings, MOST_HALVINGS));
+}
+
+bool drape_ladder_goes_on(drape_ladder *l, double apart)
+{
+    if (!(apart > l->fixed_error))
+        return false;
+    l->trust *= apart / l->fixed_error;
+    l->fixed_error = apart;
+    const double most = work_of_halvings(l, apart);
+    const bool more = most > l->rung.most;
+    l->rung.most = fmax(most, l->rung.most);
+    return more;
 }
 
 static bool halve(drape_ladder *l)
@@ -59,40 +90,41 @@ static bool halve(drape_ladder *l)
     return l->rung.value > l->least_step;
 }
 
+static bool next_controlled(drape_ladder *l, const drape_rung_result *r)
+{
+    if (r->given_up) {
+        l->can_control = false;
+        l->before = NAN;
+        return halve(l);
+    }
+    l->rung.value /= 10;
+    l->rung.share = tenth_share[l->hits];
+    return l->stuck < MOST_STUCK && l->rung.value > LEAST_RTOL;
+}
+
 bool drape_ladder_next(drape_ladder *l, const drape_rung_result *r)
 {
-    const double error = drape_ladder_error(l, r->apart);
-    const bool follows = !isnan(r->apart), known = follows && !isnan(l->before);
-    const bool converges = !known || l->before > SAME * r->apart;
+    const bool follows = !isnan(r->apart),
+               converges = !follows || isnan(l->before) || l->before > SAME * r->apart;
+    const double error = drape_ladder_error(l, r->apart, r->fraction >= 1);
     if (!r->given_up && r->fraction >= 1 && error <= l->accuracy)
         return false;
-    l->ratio = known ? l->before / r->apart : NAN;
-    l->before = follows ? r->apart : NAN;
-    if (l->rung.controlled) {
-        if (r->given_up) {
-            l->gave_up = true;
-            l->before = l->ratio = NAN;
-            return halve(l);
-        }
-        l->unpredictable = !converges;
-        if (!converges || l->rung.value < LEAST_RTOL)
-            return false;
-        l->rung.value /= 10;
-        l->rung.share = CONTROL_SHARE;
-        return true;
-    }
+    l->stuck = converges ? 0 : l->stuck + 1;
+    l->before = r->fraction < 1 || (l->rung.controlled && l->rung.share == 1) ? NAN : r->apart;
+    if (l->rung.controlled)
+        return next_controlled(l, r);
     l->fixed = l->rung;
-    const double halvings = follows ? log2(fmax(error / l->accuracy, 1)) / order_of(&l->rung) : 1;
-    if (!l->can_control || l->gave_up || !follows || (converges && halvings <= 1)) {
-        l->unpredictable = !converges && (l->gave_up || !l->can_control);
-        return !l->unpredictable && halve(l);
+    l->fixed_error = error;
+    l->fixed_work = r->work / r->fraction;
+    if (!l->can_control || !follows || (converges && error <= gain(l) * l->accuracy)) {
+        return l->stuck < MOST_STUCK && halve(l);
     }
+    l->before = NAN;
     l->rung = (drape_rung){.method = "rosenbrock",
                            .key = "rtol",
-                           .value = fmin(FIRST_RTOL * l->accuracy, 0.1),
+                           .value = fmin(FIRST_RTOL * l->accuracy, LARGEST_RTOL),
                            .controlled = true,
                            .share = 1, /* the other is of another method */
-                           .most = r->work / r->fraction * pow(2, 1 + fmin(ceil(halvings), MOST_HALVINGS))};
-    l->before = l->ratio = NAN;
+                           .most = work_of_halvings(l, error)};
     return true;
 }

@@ -6,7 +6,8 @@
  * The first rungs halve the step: of bdf2 or, where there are bodies to hit, of newton_k. If they are further
  * from the aim than one more halving is worth, error control comes next, from a tolerance ten times the
  * accuracy on, with as much work as the halvings would take. If that is spent, steps are halved after all.
- * Where two rungs differ as much as the two before them, so would the next: the motion is not predictable.
+ * Where rungs differ as much as those before them, twice in a row, so would the next: the motion is not
+ * predictable.
  */
 #ifndef DRAPE_ACCURACY_LADDER_H
 #define DRAPE_ACCURACY_LADDER_H
@@ -17,8 +18,8 @@ typedef struct drape_rung {
     const char *method, *key; /* of the integrator, and "dt" [s] or "rtol" [1] */
     double value;
     bool controlled; /* it has error control */
-    double share;    /* of the distance to the rung before, that this one is off by */
-    double most;     /* [work] after which it is given up; INFINITY: never */
+    double share; /* of the distance to the rung before, that this one is off by, if nothing else is known */
+    double most;  /* [work] after which it is given up; INFINITY: never */
 } drape_rung;
 
 /* What a rung has shown, in a run that may have been cut short. */
@@ -26,28 +27,35 @@ typedef struct drape_rung_result {
     double apart;    /* [1] largest distance to the rung before; NAN: there is none */
     double fraction; /* of the run that was made */
     double work;   /* evaluations of the residual, and of the matrix with its factors, which count as four */
-    bool given_up; /* its work, or it failed */
+    bool given_up; /* it has done its work, or has failed */
 } drape_rung_result;
 
 typedef struct drape_ladder {
-    double accuracy;           /* [1] asked */
-    bool can_control, gave_up; /* methods with error control can run the model; they were too dear */
-    drape_rung rung;           /* the present one */
-    drape_rung fixed;          /* the last one of fixed steps */
-    double before;     /* [1] how far the two rungs before were apart; NAN: they were of two methods */
-    double ratio;      /* of the last two distances; NAN: unknown */
-    double least_step; /* [s] */
-    bool unpredictable;
+    double accuracy;                /* [1] asked */
+    double least_step;              /* [s] */
+    bool hits;                      /* there are bodies, at which all methods are of order 1 */
+    bool can_control;               /* methods with error control can run the model, and were not too dear */
+    drape_rung rung, fixed;         /* the present one; the last one of fixed steps */
+    double fixed_error, fixed_work; /* [1], [work] of the latter, of a whole run */
+    double trust; /* by how much errors of fixed steps are larger than they seem: error control showed it */
+    double
+        before; /* [1] how far the two rungs before were apart; NAN: unknown, or they were of two methods */
+    int stuck;  /* rungs in a row that are as far from the one before as that was from its own */
 } drape_ladder;
 
 /* Begins on the first rung, for cloth of this size: the smallest diagonal [m]. */
 void drape_ladder_init(drape_ladder *ladder, const drape_model *model, double size, double accuracy);
 
-/* [1] how far the present rung is off, where it is `apart` from the one before. */
-double drape_ladder_error(const drape_ladder *ladder, double apart);
+/* [1] how far the present rung is off, where it is `apart` from the one before: by the ratio of that distance
+ * to the one before it (Richardson), if both are of whole runs, and otherwise by the rung's share. */
+double drape_ladder_error(const drape_ladder *ladder, double apart, bool whole);
 
 /* The distance to the rung before from which on the present one cannot be the last. */
 double drape_ladder_hopeless(const drape_ladder *ladder);
+
+/* Whether a rung that has done its work may go on, being so far apart from the one before: if that is more than
+ * the error that was told of fixed steps, these are not to be trusted, and would take more work. */
+bool drape_ladder_goes_on(drape_ladder *ladder, double apart);
 
 /* Moves to the next rung; false: the present one is the last. */
 bool drape_ladder_next(drape_ladder *ladder, const drape_rung_result *result);

@@ -70,6 +70,7 @@ void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, dou
     e->point.internal = in->internal;
     e->point.history = NULL;
     e->expected = e->carried = NULL;
+    e->pins_ahead = 0;
     e->point.t = e->point.span[1] = t;
     e->point.span[0] = in->t;
     e->x_start = in->x;
@@ -151,7 +152,8 @@ void drape_implicit_end_euler(drape_implicit *s, const drape_state *in, drape_st
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         out->v[at] = s->d[i] / h;
-        ahead[at] = (s->d[i] - e->inertia[i]) * e->mass_weight * h / 2;
+        /* where terms have momenta, u is the velocity of those that are conserved */
+        ahead[at] = e->momentum ? 0 : (s->d[i] - e->inertia[i]) * e->mass_weight * h / 2;
     }
     s->made.impact = hits(e, in);
     settle_contact(s, in, h, ahead, out->v);
