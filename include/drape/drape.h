@@ -1431,21 +1431,21 @@ typedef struct drape_accuracy {
     bool reached;        /* that is the end of the run */
     int32_t runs;        /* that were made, this one included */
     double seconds;      /* [s] wall-clock time of the steps of the others */
-    char method[64];     /* by which this run is made: "bdf2, dt 0.0125" */
+    char method[128];    /* by which this run is made: "bdf2, dt 0.0125" */
 } drape_accuracy;
 
 /* Called before each run, with its sim, to which observers may be added, and what the runs before have shown:
- * what observers saw of an earlier sim is superseded, and they are not called for it any more. The sim must be
- * used by observers only. A status other than 0 ends the runs, and is returned. */
+ * what observers saw of an earlier sim is superseded, and they are not called for it any more. The sim must
+ * be used by observers only. A status other than 0 ends the runs, and is returned. */
 typedef drape_status drape_run_prepare(void *user, drape_sim *sim, const drape_accuracy *before);
 
 /* Runs a model from its start for its duration until a run is as accurate as its scene asks for: chooses
- * methods and steps, compares each run with the one before, and stops refining where that leads nowhere, since
- * a motion may be predictable up to some time only. def: threads and the like; its method and settings are
- * replaced; may be NULL, as prepare may. *out: the sim of the last run, which is the caller's, also after a
- * failure that came later than its creation. Errors: DRAPE_E_ARGUMENT (NULL, no accuracy is asked, or one below
- * what double precision gives, the scene names a method that does not converge), those of drape_sim_create and
- * drape_sim_advance, of prepare. Thread-safety: that of the context. */
+ * methods and steps, compares each run with the one before, and stops refining where that leads nowhere,
+ * since a motion may be predictable up to some time only. def: threads and the like; its method and settings
+ * are replaced; may be NULL, as prepare may. *out: the sim of the last run, which is the caller's, also after
+ * a failure that came later than its creation. Errors: DRAPE_E_ARGUMENT (NULL, no accuracy is asked, or one
+ * below what double precision gives, the scene names a method that does not converge), those of
+ * drape_sim_create and drape_sim_advance, of prepare. Thread-safety: that of the context. */
 DRAPE_API drape_status drape_run_accurately(drape_context *ctx, const drape_model *model,
                                             const drape_sim_def *def, drape_run_prepare *prepare, void *user,
                                             drape_sim **out, drape_accuracy *report);

@@ -1,7 +1,7 @@
 /* accuracy.c: see accuracy.h. */
 #include "accuracy/accuracy.h"
 
-#include "accuracy/ladder.h"
+#include "accuracy/refinement.h"
 #include "geometry/deviation.h"
 
 #include <math.h>
@@ -28,7 +28,7 @@ typedef struct accurate {
     void *user;
     drape_arena arena;
     drape_deviation apart;
-    drape_ladder ladder;
+    drape_refinement refinement;
     double end;
     int64_t most;            /* frames */
     double *largest, *times; /* (most) how far apart the last two runs are until each [1], [s] */
@@ -51,13 +51,14 @@ static double bound_of(const accurate *a, int32_t cloth)
     return asked->is_share ? asked->value * a->apart.cloths[cloth].diagonal : asked->value;
 }
 
-/* How far the runs are apart at most, in units of what is asked of each cloth, times `accuracy` of the ladder. */
+/* How far the runs are apart at most, in units of what is asked of each cloth, times `accuracy` of the
+ * refinement. */
 static double largest(const accurate *a)
 {
     double most = 0;
     for (int32_t c = 0; c < a->model->cloth_count; c++)
         most = fmax(most, a->apart.cloths[c].largest.rms / bound_of(a, c));
-    return a->ladder.accuracy * most;
+    return a->refinement.accuracy * most;
 }
 
 static void advance_trial(trial *t, int64_t frames)
@@ -83,7 +84,7 @@ static bool compare(accurate *a, double t, int64_t k)
     drape_deviation_add(&a->apart, t, a->now->x + n * (size_t)k, before->x + n * (size_t)k);
     a->largest[k] = largest(a);
     a->times[k] = t;
-    return largest(a) <= drape_ladder_hopeless(&a->ladder);
+    return largest(a) <= drape_refinement_hopeless(&a->refinement);
 }
 
 static drape_status watch(void *user, const drape_event *event)
@@ -91,8 +92,8 @@ static drape_status watch(void *user, const drape_event *event)
     trial *t = user;
     accurate *a = t->of;
     const size_t n = 3 * (size_t)a->model->node_count;
-    if (event->kind == DRAPE_EVENT_ATTEMPT && t == a->now && work_of(t->sim) > a->ladder.rung.most &&
-        !(a->apart.frames > 0 && drape_ladder_goes_on(&a->ladder, largest(a))))
+    if (event->kind == DRAPE_EVENT_ATTEMPT && t == a->now && work_of(t->sim) > a->refinement.level.most &&
+        !(a->apart.frames > 0 && drape_refinement_goes_on(&a->refinement, largest(a))))
         t->rests = t->given_up = true;
     if (event->kind == DRAPE_EVENT_FRAME && t->frames < a->most) {
         memcpy(t->x + n * (size_t)t->frames, event->positions, n * sizeof *t->x);
@@ -116,23 +117,30 @@ static void end_trial(accurate *a, trial *t)
     *t = (trial){.of = a};
 }
 
-/* Begins the run of the ladder's rung, as a->now. */
-static drape_status begin_trial(accurate *a, const drape_sim_def *given)
+static drape_sim_def def_of(const drape_sim_def *given, const drape_level *level, drape_setting *setting)
 {
-    const drape_rung *rung = &a->ladder.rung;
-    const drape_setting setting = {.name = rung->key, .number = rung->value};
     drape_sim_def def = *given;
-    trial *t = a->now;
-    def.integrator = rung->method;
-    def.integrator_settings = &setting;
+    *setting = (drape_setting){.name = level->key, .number = level->value};
+    def.integrator = level->method;
+    def.integrator_settings = setting;
     def.integrator_setting_count = 1;
     def.controller = "halving";
+    return def;
+}
+
+/* Begins the run of the refinement's level, as a->now. */
+static drape_status begin_trial(accurate *a, const drape_sim_def *given)
+{
+    const drape_level *level = &a->refinement.level;
+    drape_setting setting;
+    const drape_sim_def def = def_of(given, level, &setting);
+    trial *t = a->now;
     *t = (trial){.of = a, .compares = a->before->frames > 0};
     t->x = drape_arena_take(&a->arena, 3 * (size_t)a->model->node_count * (size_t)a->most, sizeof *t->x);
     drape_status status = t->x ? drape_sim_create(a->ctx, a->model, &def, &t->sim) : DRAPE_E_MEMORY;
     a->report->runs++;
-    snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", rung->method, rung->key,
-             rung->value);
+    snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", level->method, level->key,
+             level->value);
     a->apart.frames = 0;
     for (int32_t c = 0; c < a->model->cloth_count; c++)
         a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
@@ -156,7 +164,7 @@ static void fill_report(accurate *a, bool whole)
     const drape_deviation_cloth *cloth = &a->apart.cloths[c];
     const drape_apart *most = &cloth->largest;
     const double apart = largest(a),
-                 share = apart > 0 ? drape_ladder_error(&a->ladder, apart, whole) / apart : 1;
+                 share = apart > 0 ? drape_refinement_error(&a->refinement, apart, whole) / apart : 1;
     drape_accuracy *r = a->report;
     r->error = a->apart.frames > 0 ? share * most->rms / cloth->diagonal : NAN;
     r->distance = a->apart.frames > 0 ? share * most->rms : NAN;
@@ -166,38 +174,56 @@ static void fill_report(accurate *a, bool whole)
     r->time = most->time;
     memcpy(r->place, most->place[0], sizeof r->place);
     r->until = 0;
-    for (int64_t k = 0; k < a->apart.frames && share * a->largest[k] <= a->ladder.accuracy; k++)
+    for (int64_t k = 0; k < a->apart.frames && share * a->largest[k] <= a->refinement.accuracy; k++)
         r->until = a->times[k];
-    r->reached = whole && a->apart.frames > 0 && share * apart <= a->ladder.accuracy;
+    r->reached = whole && a->apart.frames > 0 && share * apart <= a->refinement.accuracy;
     if (r->reached)
         r->until = a->end;
 }
 
-static drape_status climb(accurate *a, const drape_sim_def *def)
+/* The last run has parted from the one before: nothing says any more where the cloth is, and what follows is as
+ * good by the cheapest method that was tried. */
+static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
+{
+    const drape_level *fixed = &a->refinement.fixed;
+    trial *t = a->now;
+    drape_setting setting;
+    drape_status status = DRAPE_OK;
+    t->compares = t->rests = false;
+    if (a->refinement.level.controlled) {
+        const size_t used = strlen(a->report->method);
+        const drape_sim_def def = def_of(given, fixed, &setting);
+        status = drape_sim_advance(t->sim, drape_sim_time(t->sim)); /* frames of the last step */
+        if (!status)
+            status = drape_sim_continue_by(t->sim, &def);
+        snprintf(a->report->method + used, sizeof a->report->method - used, "; from %.3g s on %s, dt %.3g",
+                 drape_sim_time(t->sim), fixed->method, fixed->value);
+    }
+    return status ? status : drape_sim_advance(t->sim, a->end);
+}
+
+/* One level after the other. */
+static drape_status refine(accurate *a, const drape_sim_def *given)
 {
     drape_status status = DRAPE_OK;
     for (bool more = true; more && !status;) {
-        status = begin_trial(a, def);
-        if (status)
-            return status;
-        const double before = drape_sim_time(a->now->sim);
-        status = drape_sim_advance(a->now->sim, a->end);
+        status = begin_trial(a, given);
+        if (!status)
+            status = drape_sim_advance(a->now->sim, a->end);
         trial *t = a->now;
+        if (status && !t->rests && (status == DRAPE_E_STOPPED || !t->sim || drape_sim_time(t->sim) == 0))
+            return status; /* by the host, or at once */
+        const drape_status failure = t->rests ? DRAPE_OK : status;
         t->over = !t->rests;
-        if (status == DRAPE_E_STOPPED && !t->rests) /* by the host */
-            return status;
-        const bool failed = status && !t->rests;
-        const double fraction = (drape_sim_time(t->sim) - before) / a->end;
-        fill_report(a, t->over && !failed && a->apart.frames == t->frames);
-        const drape_rung_result result = {.apart = a->apart.frames > 0 ? largest(a) : NAN,
-                                          .fraction = fmax(t->over && !failed ? 1 : fraction, ROUNDING),
-                                          .work = work_of(t->sim),
-                                          .given_up = t->given_up || failed};
-        const drape_status own = status;
-        more = drape_ladder_next(&a->ladder, &result);
-        status = DRAPE_OK;
-        if (!more && failed)
-            return own;
+        fill_report(a, t->over && !failure && a->apart.frames == t->frames);
+        const drape_level_result result = {
+            .apart = a->apart.frames > 0 ? largest(a) : NAN,
+            .fraction =
+                t->over && !failure ? 1 : fmin(fmax(drape_sim_time(t->sim) / a->end, ROUNDING), 1 - ROUNDING),
+            .work = work_of(t->sim),
+            .given_up = t->given_up || failure};
+        more = drape_refinement_next(&a->refinement, &result);
+        status = more ? DRAPE_OK : failure;
         if (more && result.given_up) {
             end_trial(a, t);
         } else if (more) {
@@ -206,10 +232,8 @@ static drape_status climb(accurate *a, const drape_sim_def *def)
             end_trial(a, old);
             a->before = t;
             a->now = old;
-        } else if (t->rests) { /* it is as good as any will be */
-            t->compares = t->rests = false;
-            status = drape_sim_advance(t->sim, a->end);
-        }
+        } else if (!status && t->rests)
+            status = go_on_cheaply(a, given);
     }
     return status;
 }
@@ -266,10 +290,10 @@ drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, 
         double size = INFINITY;
         for (int32_t c = 0; c < model->cloth_count; c++)
             size = fmin(size, a.apart.cloths[c].diagonal);
-        drape_ladder_init(&a.ladder, model, size,
-                          model->accuracy.value / (model->accuracy.is_share ? 1 : size));
-        report->asked = a.ladder.accuracy;
-        status = climb(&a, def ? def : &own);
+        drape_refinement_init(&a.refinement, model, size,
+                              model->accuracy.value / (model->accuracy.is_share ? 1 : size));
+        report->asked = a.refinement.accuracy;
+        status = refine(&a, def ? def : &own);
     }
     *out = a.now->sim;
     a.now->sim = NULL;

@@ -1,7 +1,8 @@
 /*
- * accuracy.h: runs of a model until one is as accurate as its scene asks for: drape_run_accurately of drape.h.
- * Each is compared with the one before at every frame (geometry/deviation.h), and ladder.h chooses the next.
- * The one before goes on only as far as it is needed: a run that is too far off is left where that shows.
+ * accuracy.h: runs of a model until one is as accurate as its scene asks for: drape_run_accurately of
+ * drape.h. Each is compared with the one before at every frame (geometry/deviation.h), and refinement.h
+ * chooses the next. The one before goes on only as far as it is needed: a run that is too far off is left
+ * where that shows.
  */
 #ifndef DRAPE_ACCURACY_ACCURACY_H
 #define DRAPE_ACCURACY_ACCURACY_H

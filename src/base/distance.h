@@ -14,7 +14,7 @@ typedef struct drape_distance {
     "a length above 0 in m, cm, mm or um, such as 1mm, or a share of a cloth's diagonal, above 0 and below " \
     "1, such as 1e-2 or 1%"
 
-/* Reads all of a text; false: it is none. */
+/* Reads all of a text; false: it is no such text. */
 bool drape_distance_read(const char *text, drape_distance *out);
 
 #endif

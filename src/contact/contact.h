@@ -68,11 +68,11 @@ drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_conta
 void drape_contact_add_forces(drape_contact *contact, bool conservative, bool dissipative, double *g);
 
 /* Restitution of an impact that begins and ends within a step of size h, in which the forces above do not see
- * its speed (Newton's law of impact). Where the contacts were evaluated last, by the mean velocities of such a
- * step, has pairs that approached each other faster than the restitution velocity part by their coefficient
- * times the speed of the impact, whose square is that at the beginning of the step plus twice the acceleration
- * times the gap there. before, acceleration: of the nodes, at the beginning; v: to be changed (node_count x 3).
- * drape_contact_impacts: whether there are such pairs; drape_contact_rebounds: whether
+ * its speed (Newton's law of impact). Where the contacts were evaluated last, by the mean velocities of such
+ * a step, has pairs that approached each other faster than the restitution velocity part by their coefficient
+ * times the speed of the impact, whose square is that at the beginning of the step plus twice the
+ * acceleration times the gap there. before, acceleration: of the nodes, at the beginning; v: to be changed
+ * (node_count x 3). drape_contact_impacts: whether there are such pairs; drape_contact_rebounds: whether
  * anything has a coefficient above 0. */
 bool drape_contact_impacts(const drape_contact *contact, const double *before);
 bool drape_contact_rebounds(const drape_contact *contact);

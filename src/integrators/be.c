@@ -8,10 +8,11 @@
  * v0. At constant steps this is x1 - 2 x0 + x_ = -h^2 M^-1 g(x1, u1), the recurrence of backward Euler with
  * its damping and stability; but with s = h and u0 = v0 in the first step, as it is usually written, a fall
  * is ahead of itself by g h t/2. Here it is exact. A state has the velocity of its time, v1 = u1 + h/2 (u1 -
- * u0)/s; of nodes in contact, whose acceleration may be that of an impact, u1.
+ * u0)/s; of nodes in contact, whose acceleration may be that of an impact, u1. With terms that have momenta,
+ * s = h, u0 = v0 and v1 = u1.
  *
- * With d = x1 - x0:  M (d - h u0)/(h s) + g(x0 + d, d/h) = 0. What solves are measured by is half of d - h u0,
- * h^2 a/2 (q and C of nonlinear/stopping.h).
+ * With d = x1 - x0:  M (d - h u0)/(h s) + g(x0 + d, d/h) = 0. What solves are measured by is half of d - h
+ * u0, h^2 a/2 (q and C of nonlinear/stopping.h).
  */
 #include "integrators/implicit.h"
 

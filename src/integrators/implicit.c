@@ -93,7 +93,8 @@ void drape_implicit_begin_euler(drape_implicit *s, const drape_state *in, double
 {
     drape_step_equation *e = &s->equation;
     const bool follows = follows_euler(s, in);
-    const double span = h / 2 + (follows ? s->past.lag : 0);
+    /* of terms with momenta, which depend on the positions, only sums at the end of a step are conserved */
+    const double span = e->momentum ? h : h / 2 + (follows ? s->past.lag : 0);
     drape_implicit_base(s, in, t, h);
     e->point.weight = 1 / h;
     e->mass_weight = 1 / h * (1 / span);
@@ -137,7 +138,7 @@ static void settle_contact(const drape_implicit *s, const drape_state *in, doubl
     if (!drape_contact_rebounds(contact))
         return;
     memset(acceleration, 0, e->nodes * sizeof *acceleration);
-    for (size_t i = 0; s->past.t == in->t && i < e->dofs; i++)
+    for (size_t i = 0; s->past.t == in->t && s->past.lag > 0 && i < e->dofs; i++)
         acceleration[drape_step_equation_at(e, i)] = -s->past.offset[i] / s->past.lag;
     drape_contact_rebound(contact, h, in->v, acceleration, u);
 }
@@ -152,7 +153,6 @@ void drape_implicit_end_euler(drape_implicit *s, const drape_state *in, drape_st
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
         out->v[at] = s->d[i] / h;
-        /* where terms have momenta, u is the velocity of those that are conserved */
         ahead[at] = e->momentum ? 0 : (s->d[i] - e->inertia[i]) * e->mass_weight * h / 2;
     }
     s->made.impact = hits(e, in);
@@ -164,7 +164,7 @@ void drape_implicit_end_euler(drape_implicit *s, const drape_state *in, drape_st
     }
     drape_ranks_fetch(e->ranks, out->v);
     s->made.t = out->t;
-    s->made.lag = h / 2;
+    s->made.lag = e->momentum ? 0 : h / 2;
     drape_implicit_audit(s, in, out, info);
 }
 

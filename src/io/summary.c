@@ -185,7 +185,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                     {"factor", s.wall_factor}, {"solve", s.wall_solve},
                                     {"contact", s.wall_contact}, {"output", def->wall_output});
     object = drape_json_with(object, "wall_s", wall);
-    if (accuracy) { /* the error told, a share of the diagonal, and what else is known of it */
+    if (accuracy) { /* the estimated error, a share of the diagonal, and what else is known of it */
         json_t *place = json_array();
         for (int k = 0; k < 3; k++)
             place = drape_json_append(place, drape_json_number(accuracy->place[k]));

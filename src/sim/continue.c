@@ -200,3 +200,25 @@ drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const ui
     drape_sim_destroy(&other);
     return status;
 }
+
+drape_status drape_sim_continue_by(drape_sim *sim, const drape_sim_def *def)
+{
+    const drape_chosen present = sim->chosen;
+    drape_chosen next;
+    drape_sim *other = NULL;
+    drape_status status = drape_choose(sim->ctx, sim->model, def, &next);
+    if (status)
+        return status;
+    sim->chosen = next;
+    status = drape_sim_create_like(sim, sim->model, NULL, NULL, &other);
+    sim->chosen = present;
+    const drape_schedule fresh = other ? other->schedule : sim->schedule;
+    if (!status)
+        status = go_on(other, sim);
+    if (!status) {
+        drape_schedule_init(&other->schedule, fresh.stepping, fresh.dt, drape_sim_time(sim));
+        drape_sim_exchange(sim, other);
+    }
+    drape_sim_destroy(&other);
+    return status;
+}

@@ -12,13 +12,13 @@ def test_results():
     write_scene()
     good("run", "scene.json", "--out", "fine", "--integrator", "radau", "--set", "/integrator/rtol=1e-7", "--format", "npy")
     for text in ("2mm", "4e-3"):  # of a diagonal of 0.5 m
-        told = good("run", "scene.json", "--accuracy", text, "--out", "run", "--format", "npy").stdout
+        printed = good("run", "scene.json", "--accuracy", text, "--out", "run", "--format", "npy").stdout
         summary = read_json("run/summary.json")
         of = summary["accuracy_of"]
         assert 0 < summary["accuracy"] <= 4e-3 and of["reached"] and of["until"] == 0.25 and of["runs"] > 1, summary
         assert abs(of["distance"] - 0.5 * summary["accuracy"]) < 1e-12 and of["distance"] <= of["worst"]
         assert summary["wall_s"]["steps"] > of["earlier_runs_s"] > 0
-        assert f"accuracy  {of['method']}, the last of {of['runs']} runs: " in told, told
+        assert f"accuracy  {of['method']}, the last of {of['runs']} runs: " in printed, printed
         equal(read_npy("run/positions.npy")[0], (16, 36, 3))
         equal(read_json("run/scene.json")["accuracy"], text if text == "2mm" else 4e-3)
         good("compare", "run", "fine", "--within", text)

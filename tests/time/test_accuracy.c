@@ -61,8 +61,8 @@ static void run_finely(int k, seen *fine)
     scene_advance(&s, 0.4);
 }
 
-/* The fine run is nearer to the motion than any that is asked for by three orders. What is told is meant to be
- * rather too much than too little, and within a factor of 3 where it is not far below what was asked. */
+/* The fine run is nearer to the motion than any that is asked for by three orders. The estimate is meant to
+ * be rather too much than too little, and within a factor of 3 where it is not far below what was asked. */
 TEST(runs_are_as_accurate_as_asked)
 {
     static const double asked[] = {3e-2, 3e-3, 3e-4};
@@ -82,8 +82,8 @@ TEST(runs_are_as_accurate_as_asked)
             for (int f = 0; f < FRAMES; f++)
                 drape_deviation_add(&apart, f / 60.0, got.x[f], fine.x[f]);
             const double error = apart.cloths[0].largest.rms / apart.cloths[0].diagonal;
-            printf("# %s, %g: off by %.2g, told %.2g, after %d runs, by %s\n", cases[k].name, asked[i], error,
-                   report.error, (int)report.runs, report.method);
+            printf("# %s, %g: off by %.2g, by its estimate %.2g, after %d runs, by %s\n", cases[k].name,
+                   asked[i], error, report.error, (int)report.runs, report.method);
             ck_assert_int_eq(got.frames, FRAMES);
             ck_assert_int_eq(got.runs, report.runs);
             ck_assert_int_gt(report.runs, 1);
