@@ -42,15 +42,6 @@ typedef struct drapemeter {
 
 static const drapemeter testers[] = {{"cusick", 0.09, 0.15}, {"jis", 0.0635, 0.127}};
 
-/* Moment of friction over bending rigidity, HB/B [1/m], of the source of the drape coefficients. */
-static const struct {
-    const char *fabric;
-    double friction;
-} friction_of[] = {{"matsudaira2015_broad", 53},
-                   {"matsudaira2015_wool", 25},
-                   {"matsudaira2015_tropical", 19},
-                   {"matsudaira2015_faille", 18}};
-
 typedef struct options {
     const char *fabric;
     const drapemeter *tester;
@@ -80,7 +71,8 @@ static drape_model *specimen(drape_context *ctx, const options *o, const drape_f
     return bench_model(
         ctx,
         "{'drape':1,'cloth':[{'mesh':{'grid':'annulus','rows':%d,'columns':%d,'inner_radius':%g,"
-        "'outer_radius':%g},'material':{'fabric':'%s'%s},'terms':[%s,{'type':'bend.midedge','poisson':0,'"
+        "'outer_radius':%g},'material':{'fabric':'%s','damping':'none'%s},'terms':[%s,{'type':'bend.midedge',"
+        "'poisson':0,'"
         "twist':%.17g%s},"
         "{'type':'drag.viscous','coefficient':1}],'pins':[{'edge':'top','clamp':true}]}],"
         "'gravity':[0,-9.81,0],'gravity_history':'weight','histories':[{'name':'weight','times':[0,%g],"
@@ -274,14 +266,11 @@ int main(int argc, char **argv)
               "published,speed,time_s,cpu_s");
     printf("%-24s %-8s %6s %5s %12s %8s %9s %8s %8s %5s %6s\n", "fabric", "sheet", "seeded", "folds",
            "energy mJ", "drape", "published", "off", "m/s", "t s", "cpu s");
-    for (size_t i = 0; i < sizeof friction_of / sizeof *friction_of; i++) {
-        const drape_fabric *f = drape_fabrics;
-        while (strcmp(f->name, friction_of[i].fabric) != 0)
-            f++;
-        if (o.fabric && strcmp(o.fabric, f->name) != 0)
+    for (const drape_fabric *f = drape_fabrics; f->name; f++) {
+        if (isnan(f->drape) || (o.fabric && strcmp(o.fabric, f->name) != 0))
             continue;
         test(&o, f, 0, csv);
-        test(&o, f, friction_of[i].friction, csv);
+        test(&o, f, round(f->bending.friction / f->bending.warp), csv); /* HB/B [1/m] */
     }
     if (csv)
         fclose(csv);

@@ -50,8 +50,8 @@ static const struct {
     {"1e4 N/m", "{'young_modulus': 3.3e7, 'thickness': 0.0003, 'areal_density': 0.15}"},
     {"1e5 N/m", "{'young_modulus': 1e8, 'thickness': 0.001, 'areal_density': 0.3}"},
     {"1e6 N/m", "{'young_modulus': 1e9, 'thickness': 0.001, 'areal_density': 0.3}"},
-    {"denim", "{'fabric': 'wang2011_denim'}"},
-    {"tablecloth", "{'fabric': 'wang2011_tablecloth'}"},
+    {"denim", "{'fabric': 'wang2011_denim', 'damping': 'none'}"},
+    {"tablecloth", "{'fabric': 'wang2011_tablecloth', 'damping': 'none'}"},
 };
 
 static const struct {
@@ -281,7 +281,7 @@ static void run_random(drape_context *ctx, const options *o, total totals[2])
                      density = between(&state, 0.02, 2);
         const char *name = fabrics[(size_t)(draw(&state) * 6)];
         if (fabric)
-            snprintf(s.material, sizeof s.material, "{'fabric': '%s'}", name);
+            snprintf(s.material, sizeof s.material, "{'fabric': '%s', 'damping': 'none'}", name);
         else
             snprintf(s.material, sizeof s.material,
                      "{'young_modulus': %g, 'thickness': %g, 'areal_density': %g}", young, thickness,

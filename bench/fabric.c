@@ -43,7 +43,7 @@ static drape_model *sheet(drape_context *ctx, int side, const terms *kind)
 {
     return bench_model(ctx,
                        "{'drape':1,'cloth':[{'mesh':{'grid':'square','columns':%d,'rows':%d,'width':1,"
-                       "'height':1},'material':{'fabric':'wang2011_denim'},'terms':[%s],"
+                       "'height':1},'material':{'fabric':'wang2011_denim','damping':'none'},'terms':[%s],"
                        "'pins':[{'corner':'top-left'},{'corner':'top-right'}]}],'duration':10}",
                        side, side, kind->list);
 }

@@ -526,6 +526,10 @@ typedef struct drape_term_ops {
      * build reads edge_image. A term without this is refused there if its elements reach over edges, or lie
      * along them. */
     bool periodic;
+
+    /* law: the loss of a measured fabric adds this term to its cloth, unless a term of the cloth dissipates
+     * within it. Its first parameter is a retardation time [s], the only one that it requires. */
+    bool from_fabric;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is

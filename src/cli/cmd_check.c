@@ -27,6 +27,78 @@ static void print_first(const drape_intersections *found)
     putchar('\n');
 }
 
+/* ---- What dissipates ---- */
+
+/* A line of a table, begun by the first of its items. */
+static void print_loss(const char *of, const char *what, bool *begun)
+{
+    if (*begun)
+        printf(", %s", what);
+    else
+        printf("%-20s %s", of, what);
+    *begun = true;
+}
+
+/* Whether a term of the model takes energy, and not the motion of pins or a host. */
+static bool is_lossy(const drape_model *m, const drape_term *t)
+{
+    const bool relaxes = t->ops->law && t->ops->build && m->cloths[t->cloth].branch_count > 0;
+    return t->ops->dissipative || t->damping || t->sliders > 0 || (relaxes && t->seam < 0);
+}
+
+/* Lists what dissipates of each cloth, of seams, of contact and by the method, and warns of cloths of which
+ * only the method takes energy: how soon these come to rest depends on its steps. */
+static void check_losses(const cli_scene *in)
+{
+    const drape_model *m = in->model;
+    const drape_chosen *chosen = &in->sim->chosen;
+    const char *method = chosen->integrator->entry.name;
+    const bool damps =
+        !chosen->integrator->conservative || drape_chosen_integrator_value(chosen, "damping", 0) > 0;
+    bool begun = false, friction = m->contact.self_friction > 0, impacts = m->contact.self_restitution < 1;
+    printf("%-20s %s\n", "dissipates", "by");
+    for (int32_t c = 0; c < m->cloth_count; c++, begun = false) {
+        const char *name = m->cloths[c].name;
+        for (int32_t i = 0; i < m->term_count; i++) {
+            const drape_term *t = &m->terms[i];
+            if (t->cloth == c && t->seam < 0 && is_lossy(m, t))
+                print_loss(
+                    CLI_SHOWN(name),
+                    t->ops->from_fabric && m->cloths[c].retardation > 0
+                        ? DRAPE_FORMAT("%s of its fabric, beta %.3g s", t->ops->entry.name, t->params[0])
+                        : t->ops->entry.name,
+                    &begun);
+        }
+        const bool none = !begun;
+        if (none)
+            print_loss(CLI_SHOWN(name), "nothing", &begun);
+        putchar('\n');
+        fflush(stdout);
+        if (none && !chosen->integrator->steady_state)
+            fprintf(stderr,
+                    "warning: /cloth/%d: %s damps the waves of %s, so %s; damp.kelvin_voigt, or a \"fabric\" "
+                    "without \"damping\": \"none\", does\n",
+                    (int)c, damps ? DRAPE_FORMAT("only the method, %s,", method) : "nothing", CLI_SHOWN(name),
+                    damps ? "how long they last depends on its steps" : "they last");
+    }
+    for (int32_t i = 0; i < m->term_count; i++)
+        if (m->terms[i].seam >= 0 && is_lossy(m, &m->terms[i]))
+            printf("%-20s %s\n", CLI_SHOWN(m->seams[m->terms[i].seam].name), m->terms[i].ops->entry.name);
+    friction = m->contact.self && friction, impacts = m->contact.self && impacts;
+    for (int32_t c = 0; c < m->collider_count; c++) {
+        friction = friction || m->colliders[c].friction > 0;
+        impacts = impacts || m->colliders[c].restitution < 1;
+    }
+    if (friction)
+        print_loss("contact", "friction", &begun);
+    if (impacts)
+        print_loss("contact", "impacts", &begun);
+    if (begun)
+        putchar('\n');
+    if (damps && !chosen->integrator->steady_state)
+        printf("%-20s what its steps do not resolve\n", method);
+}
+
 /* Also counts where cloth passes through cloth at the start. It is not a failure, as a scene without
  * self-contact may have it. */
 static int check(const check_request *request, const cli_scene *in)
@@ -55,6 +127,7 @@ static int check(const check_request *request, const cli_scene *in)
         return cli_report(&request->command, CLI_FAILED);
     printf("%lld edge-face intersections at the start", (long long)found.count);
     print_first(&found);
+    check_losses(in);
     return failed ? CLI_FAILED : CLI_DONE;
 }
 
@@ -152,8 +225,10 @@ const drape_verb drape_verb_check = {
     .takes_scene = true,
     .details =
         "SCENE: compares every analytic derivative with central differences at a deformed, rotated, moving\n"
-        "state, and counts the edges that pass through triangles at the start. Exit code 0: all derivatives\n"
-        "are within their limits.\n"
+        "state, counts the edges that pass through triangles at the start, and lists what dissipates. A "
+        "warning\n"
+        "names cloth whose waves only the method damps. Exit code 0: all derivatives are within their "
+        "limits.\n"
         "RUN, the folder of a run with positions.npy: counts, in each frame, edges of the cloth that pass\n"
         "through its triangles, triangles that reach into a collider, and edges of either that pass through\n"
         "triangles of the other, with each collider where its track has it at that time. Prints a line for\n"

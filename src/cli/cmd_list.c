@@ -4,6 +4,7 @@
 #include "cli/schema.h"
 
 #include "base/param.h"
+#include "base/pi.h"
 #include "base/reason.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"
@@ -139,6 +140,8 @@ static const drape_registry *const *list_tables(void)
                          tension.warp, tension.weft, tension.shear);
         used += snprintf(text + used, size - (size_t)used, "; bending %.3g, %.3g, twist %.3g uN m",
                          1e6 * bending.warp, 1e6 * bending.weft, 1e6 * bending.shear);
+        used += snprintf(text + used, size - (size_t)used, "; loss factor %.2g at %.2g Hz",
+                         drape_fabric_loss(f), drape_fabric_frequency(f) / (2 * DRAPE_PI));
         snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g",
                  f->drape);
         entries[i] = (drape_entry){.name = f->name, .summary = summaries[i], .reference = f->source};

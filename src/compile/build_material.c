@@ -17,6 +17,7 @@ enum {
     TOTAL_MASS,
     MASS,
     FABRIC,
+    DAMPING,
     FIRST_CURVE, /* DRAPE_CURVE_WARP */
     PARAM_COUNT = FIRST_CURVE + DRAPE_CURVE_COUNT
 };
@@ -24,6 +25,9 @@ enum {
 /* How far a curve may go: the angle of shear stays below a right one. */
 #define MAX_STRAIN 100
 #define MAX_ANGLE  89
+
+enum { DAMPING_FABRIC, DAMPING_NONE };
+static const char *const damping_choices[] = {"fabric", "none", NULL};
 
 enum { MASS_AREA, MASS_UNIFORM };
 static const char *const mass_choices[] = {"area", "uniform", NULL};
@@ -49,6 +53,10 @@ static const drape_param params[] = {
                      "a measured fabric: gives the areal density unless the scene does, the "
                      "bending of bend.midedge and, without young_modulus and thickness, the tension and "
                      "shear of stretch.cst"),
+    [DAMPING] = DRAPE_CHOICE(
+        "damping", DAMPING_FABRIC, damping_choices,
+        "of a fabric. fabric: damp.kelvin_voigt by its measured loss, unless a term of the cloth "
+        "dissipates within it; none: an elastic sheet"),
     [FIRST_CURVE + DRAPE_CURVE_WARP] =
         DRAPE_POINTS("warp_curve", "1", DRAPE_DERIVED("of the fabric, or a straight line"), 1e-9, MAX_STRAIN,
                      "tension of a strip along the warp, its sides free: strain and force per width in N/m, "
@@ -132,6 +140,8 @@ static drape_status take_fabric(drape_model *model, const drape_cloth_def *def, 
         return DRAPE_OK;
     drape_fabric_tension(fabric, &tension);
     drape_fabric_bending(fabric, bending);
+    if (values[DAMPING] == DAMPING_FABRIC)
+        cloth->retardation = drape_fabric_loss(fabric) / drape_fabric_frequency(fabric);
     for (size_t i = 0; i < def->material_count; i++)
         if (strcmp(def->material[i].name, params[POISSON_RATIO].name) == 0)
             tension.poisson = bending->poisson = values[POISSON_RATIO];

@@ -135,6 +135,17 @@ static drape_status build_elements(drape_model *model, drape_term *term, const c
     return status || term->ops->law ? status : check_elements(&builder);
 }
 
+/* A term whose dashpots are all 0 has no damping, so its rates are not needed. */
+static void find_damping(drape_model *model, drape_term *term)
+{
+    const drape_elements *el = &term->elements;
+    const double *c = term->ops->damped ? el->rest + 2 * (size_t)el->count : NULL;
+    for (int32_t e = 0; c && !term->damping && e < el->count; e++)
+        term->damping = c[e] != 0 ? c : NULL;
+    model->has_laws = model->has_laws || term->damping;
+    model->has_dissipation = model->has_dissipation || term->damping;
+}
+
 static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
                                const drape_entry_def *def)
 {
@@ -149,6 +160,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
         return ops->build ? build_elements(model, term, pointer) : DRAPE_OK;
     }
     DRAPE_TRY(build_elements(model, term, pointer));
+    find_damping(model, term);
     return drape_compile_history_of(model, pointer, def, term);
 }
 
@@ -167,17 +179,43 @@ static const drape_term_ops *term_at(const drape_context *ctx, int i)
     return i < built_in ? drape_terms[i] : drape_context_term_ops(ctx, false, i - built_in);
 }
 
-/* The number of terms that the scene's gravity adds to every cloth. */
+/* The number of terms that the scene's gravity, or the loss of a fabric, may add to a cloth. */
 static size_t count_implied(const drape_context *ctx)
 {
     const drape_term_ops *ops;
     size_t count = 0;
     for (int i = 0; (ops = term_at(ctx, i)) != NULL; i++)
-        count += ops->from_scene_gravity;
+        count += ops->from_scene_gravity || ops->from_fabric;
     return count;
 }
 
-/* Builds the terms that the scene names, then those that its gravity adds if it is not zero.
+/* Adds the loss of a measured fabric, unless a term of the cloth has a loss itself. Air around the cloth and
+ * what seams take are none of the fabric. */
+static drape_status build_loss(drape_model *model, int32_t c)
+{
+    drape_cloth *cloth = &model->cloths[c];
+    bool lossy = cloth->branch_count > 0, measured = false;
+    const drape_term_ops *ops;
+    for (int32_t i = 0; i < model->term_count; i++) {
+        const drape_term *term = &model->terms[i];
+        if (term->cloth != c)
+            continue;
+        lossy = lossy || term->damping || term->sliders > 0 || (term->ops->law && term->ops->dissipative);
+        measured = measured || term->ops->measure;
+    }
+    if (lossy || !measured)
+        cloth->retardation = 0;
+    for (int i = 0; cloth->retardation > 0 && (ops = term_at(model->ctx, i)) != NULL; i++) {
+        if (!ops->from_fabric)
+            continue;
+        const drape_setting setting = {.name = ops->entry.params[0].name, .number = cloth->retardation};
+        const drape_entry_def def = {.type = ops->entry.name, .settings = &setting, .setting_count = 1};
+        DRAPE_TRY(build_term(model, c, DRAPE_FORMAT("/cloth/%d/material", (int)c), ops, &def));
+    }
+    return DRAPE_OK;
+}
+
+/* Builds the terms that the scene names, the loss of a fabric, then those that gravity adds if it is not zero.
  * gravity_history: the name of the history of the latter, or NULL. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
                                 const char *gravity_history)
@@ -199,6 +237,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
                 ops->entry.name);
         DRAPE_TRY(build_term(model, c, pointer, ops, &def->terms[i]));
     }
+    DRAPE_TRY(build_loss(model, c));
     for (int i = 0; has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++) {
         drape_term *term = &model->terms[model->term_count];
         if (!ops->from_scene_gravity)
@@ -208,17 +247,6 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
             DRAPE_TRY(drape_compile_history_named(model, "/gravity_history", gravity_history, term));
     }
     return DRAPE_OK;
-}
-
-/* A term whose dashpots are all 0 has no damping, so its rates are not needed. */
-static void find_damping(drape_model *model, drape_term *term)
-{
-    const drape_elements *el = &term->elements;
-    const double *c = term->ops->damped ? el->rest + 2 * (size_t)el->count : NULL;
-    for (int32_t e = 0; c && !term->damping && e < el->count; e++)
-        term->damping = c[e] != 0 ? c : NULL;
-    model->has_laws = model->has_laws || term->damping;
-    model->has_dissipation = model->has_dissipation || term->damping;
 }
 
 /* Builds the term that joins the nodes of a seam. */
@@ -284,7 +312,6 @@ static drape_status connect_laws(drape_model *model, int32_t c)
         term->law_count = cloth->law_count;
         term->branches = cloth->branches;
         term->branch_count = cloth->branch_count;
-        find_damping(model, term);
     }
     model->has_laws = model->has_laws || cloth->law_count > 0;
     const char *pointer = DRAPE_FORMAT("/cloth/%d/terms", (int)c);
@@ -329,8 +356,10 @@ static bool well_formed(const drape_term_ops *ops)
            sized && internal &&
            (!ops->part ||
             (ops->measure && ops->part_nodes >= 1 && ops->part_nodes <= DRAPE_MAX_ELEMENT_NODES)) &&
-           (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
-           (!ops->kinetic || ops->dissipation) && (!ops->build_seam || !ops->part) &&
+           (!ops->damped || ops->measure) &&
+           (!ops->from_fabric || (ops->law && ops->entry.param_count > 0)) &&
+           (!ops->in_medium || ops->dissipation) && (!ops->kinetic || ops->dissipation) &&
+           (!ops->build_seam || !ops->part) &&
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
@@ -347,7 +376,8 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "the ops of term \"%s\" are not well formed: name, summary, reference, "
             "element_name, exactly one of measure, "
             "energy, dissipation, law; nodes 1 to %d and build or build_seam but for a law; commit and "
-            "initial with has_internal; damped with a measure alone, in_medium and kinetic with a "
+            "initial with has_internal; damped with a measure alone, from_fabric with a law that has "
+            "parameters, in_medium and kinetic with a "
             "dissipation; part with "
             "a measure and part_nodes, and without build_seam; "
             "at most %d values of parameters, each with name and unit, a choice with choices",

@@ -16,6 +16,7 @@ typedef struct drape_fabric {
     } stretched;
     struct {
         double warp, weft, diagonal; /* rigidity of strips [N m] */
+        double friction;             /* HB, the moment of friction per width [N] */
     } bending;
     double drape; /* drape coefficient from a drape tester [1] */
 } drape_fabric;
@@ -27,6 +28,12 @@ extern const char *const drape_fabric_names[];
  * coupling, and the twist of an isotropic sheet. */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
+
+/* The loss factor [1], what a cycle loses over 2 pi times what it stores, and the frequency [rad/s] at which
+ * the fabric has it in the model, that of its folds. Their ratio is the retardation time of Kelvin-Voigt
+ * damping [s], whose loss factor is proportional to the frequency. */
+double drape_fabric_loss(const drape_fabric *fabric);
+double drape_fabric_frequency(const drape_fabric *fabric);
 
 /* The points of the tension curve along warp and weft, strain and force per width, of a fabric of which more
  * was measured than the stiffness at rest; returns false for others. */

@@ -1,12 +1,14 @@
 /*
  * fabrics_table.h: the entries of drape_fabrics and their number. fabrics.c explains sources and units.
  * ENTRY(name, what it is, source, areal density, C11, C22, C12, C66 of tension, C11 and C22 at a strain of
- * 1/6, rigidities along warp, weft and the diagonal, drape coefficient), in SI units; NAN: not published.
+ * 1/6, rigidities along warp, weft and the diagonal, HB of bending, drape coefficient), in SI units; NAN: not
+ * published.
  */
 #ifndef DRAPE_COMPILE_FABRICS_TABLE_H
 #define DRAPE_COMPILE_FABRICS_TABLE_H
 
 #define GF_CM 9.80665e-5 /* gf cm2/cm [N m] */
+#define GF    9.80665e-3 /* gf cm/cm [N m/m] */
 
 #define WANG       "Wang, O'Brien & Ramamoorthi 2011"
 #define FENG       "Feng, Huang, Xu & Wang 2022"
@@ -18,16 +20,16 @@
                 along_u)                                                                                     \
     ENTRY(name, what, WANG, density,                                                                         \
         2 * (c22), 2 * (c11), 2 * (c12), c33, 2 * (far_c22), 2 * (far_c11),                                  \
-        2.5e-7 * (along_v), 2.5e-7 * (along_u), 2.5e-7 * (diagonal), NAN)
+        2.5e-7 * (along_v), 2.5e-7 * (along_u), 2.5e-7 * (diagonal), NAN, NAN)
 #define OF_FENG(ENTRY, number, density, warp, weft, diagonal)                                                \
     ENTRY("feng2022_" #number, "number " #number " of 618", FENG, density,                                   \
-        NAN, NAN, NAN, NAN, NAN, NAN, 1e-9 * (warp), 1e-9 * (weft), 1e-9 * (diagonal), NAN)
-#define OF_MATSUDAIRA(ENTRY, name, what, density, bending, drape)                                            \
+        NAN, NAN, NAN, NAN, NAN, NAN, 1e-9 * (warp), 1e-9 * (weft), 1e-9 * (diagonal), NAN, NAN)
+#define OF_MATSUDAIRA(ENTRY, name, what, density, bending, loop, drape)                                      \
     ENTRY(name, what, MATSUDAIRA, density,                                                                   \
-        NAN, NAN, NAN, NAN, NAN, NAN, GF_CM * (bending), GF_CM * (bending), NAN, drape)
+        NAN, NAN, NAN, NAN, NAN, NAN, GF_CM * (bending), GF_CM * (bending), NAN, GF / 2 * (loop), drape)
 
 #define DRAPE_FABRICS(ENTRY)                                                                                 \
-    ENTRY("none", "no measured fabric", "", 0, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN)             \
+    ENTRY("none", "no measured fabric", "", 0, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN, NAN)        \
     OF_FENG(ENTRY, 1, 0.0673, 1779.9, 3076.2, 2244.1)                                                        \
     OF_FENG(ENTRY, 3, 0.1834, 61211.1, 24116.1, 23803.5)                                                     \
     OF_FENG(ENTRY, 6, 0.1972, 9183.1, 7598.0, 3752.0)                                                        \
@@ -55,10 +57,10 @@
     OF_WANG(ENTRY, "wang2011_tshirt", "T-shirt, 60 % cotton 40 % polyester", 0.187,                          \
         16.593832, 0, 34.477123, 36.860302, 46.364765, 405.872833,                                           \
         23.191698, 24.749964, 14.267624)                                                                     \
-    OF_MATSUDAIRA(ENTRY, "matsudaira2015_broad", "cotton broadcloth", 0.1238, 0.118, 0.829)                  \
-    OF_MATSUDAIRA(ENTRY, "matsudaira2015_wool", "wool tropical", 0.1629, 0.067, 0.498)                       \
-    OF_MATSUDAIRA(ENTRY, "matsudaira2015_tropical", "polyester tropical", 0.1165, 0.077, 0.507)              \
-    OF_MATSUDAIRA(ENTRY, "matsudaira2015_faille", "polyester faille", 0.1043, 0.019, 0.283)
+    OF_MATSUDAIRA(ENTRY, "matsudaira2015_broad", "cotton broadcloth", 0.1238, 0.118, 0.124, 0.829)           \
+    OF_MATSUDAIRA(ENTRY, "matsudaira2015_wool", "wool tropical", 0.1629, 0.067, 0.033, 0.498)                \
+    OF_MATSUDAIRA(ENTRY, "matsudaira2015_tropical", "polyester tropical", 0.1165, 0.077, 0.029, 0.507)       \
+    OF_MATSUDAIRA(ENTRY, "matsudaira2015_faille", "polyester faille", 0.1043, 0.019, 0.007, 0.283)
 
 /* clang-format on */
 

@@ -64,6 +64,8 @@ typedef struct drape_integrator_ops {
     double gain;
     /* There is no motion between the states of a step, so there are no frames. */
     bool steady_state;
+    /* It damps nothing by itself: waves that its steps do not resolve persist. */
+    bool conservative;
     /* It enforces contact and limits by moving nodes, so the forces that stand for them (contact of the
      * model, terms that are a constraint) must not act, too: the sim creates its system without them. */
     bool projects_contact;

@@ -49,6 +49,7 @@ const drape_integrator_ops drape_integrator_midpoint = {
               .reference = "Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, II.1.3",
               DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
+    .conservative = true,
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,

@@ -493,6 +493,7 @@ const drape_integrator_ops drape_integrator_verlet = {
               .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
               DRAPE_PARAMS(params)},
     .order = 2,
+    .conservative = true,
     .create = create,
     .projects_contact = true,
     .in_space = true,

@@ -64,8 +64,8 @@ DRAPE_REFERENCE(cusick_stiff,
 static int drape_scene_of(const drape_reference_run *c, char text[DRAPE_LAB_TEXT])
 {
     return SHEET_TEXT(text, OVERHANG, .rows = ROWS, .columns = SPOKES,
-                      .material = SHEET_FORMAT("'fabric': '%s', 'young_modulus': %g, 'poisson_ratio': 0, "
-                                               "'thickness': 1e-3",
+                      .material = SHEET_FORMAT("'fabric': '%s', 'damping': 'none', 'young_modulus': %g, "
+                                               "'poisson_ratio': 0, 'thickness': 1e-3",
                                                drape_fabrics[(int)c->parameter].name, TENSION / 1e-3),
                       .terms = "'stretch.cst', 'bend.midedge', {'type': 'drag.viscous', 'coefficient': 1}",
                       .integrator = "'method': 'be', 'globalization': 'work'", .dt = 0.02, .tolerance = 1e-6);

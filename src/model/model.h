@@ -207,6 +207,7 @@ typedef struct drape_cloth {
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending;           /* of a measured fabric; warp 0: not a measured fabric */
+    double retardation;                     /* [s] of a measured fabric's loss; 0: none acts */
     drape_points curves[DRAPE_CURVE_COUNT]; /* measured: see drape_cloth_view */
     double *material_mass;                  /* (mesh.node_count) [kg] of the material alone */
     double *node_mass;     /* (mesh.node_count) [kg] with the "masses" of the scene; material_mass itself

@@ -38,4 +38,5 @@ const drape_term_ops drape_term_damp_kelvin_voigt = {
     .element_name = "measure",
     .law = law,
     .dissipative = true,
+    .from_fabric = true,
 };

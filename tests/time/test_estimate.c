@@ -17,7 +17,7 @@
     "'terms': [%s], %s}], 'integrator': {'method': '%s', 'dt': 0.016666666666666666 %s}}"
 #define SOFT  "'young_modulus': 1e6, 'thickness': 0.001, 'areal_density': 0.2"
 #define STIFF "'young_modulus': 1e8, 'thickness': 0.001, 'areal_density': 0.3"
-#define DENIM "'fabric': 'wang2011_denim'"
+#define DENIM "'fabric': 'wang2011_denim', 'damping': 'none'"
 #define EDGES "'stretch.edge', 'bend.hinge'"
 #define FACES "'stretch.cst', 'bend.midedge'"
 #define PINS  "'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]"
