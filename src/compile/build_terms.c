@@ -215,7 +215,7 @@ static drape_status build_loss(drape_model *model, int32_t c)
     return DRAPE_OK;
 }
 
-/* Builds the terms that the scene names, the loss of a fabric, then those that gravity adds if it is not zero.
+/* Builds the terms that the scene names, the loss of a fabric, and those of gravity if it is not zero.
  * gravity_history: the name of the history of the latter, or NULL. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def,
                                 const char *gravity_history)

@@ -27,6 +27,7 @@
  */
 #include "compile/fabrics.h"
 
+#include "base/elementary.h"
 #include "base/pi.h"
 #include "compile/fabrics_table.h"
 
@@ -37,7 +38,7 @@
 #define SHEAR   34.4 /* [N/m] */
 #define LOSS    0.1  /* loss factor [1] */
 
-#define SWEEP   250.0   /* [1/m] to which KES-FB2 bends both ways (Kawabata 1980) */
+#define SWEEP   250.0   /* [1/m] curvature, of either sign, to which KES-FB2 bends (Kawabata 1980) */
 #define GRAVITY 9.80665 /* [m/s2] */
 
 /* clang-format off */
@@ -93,7 +94,7 @@ double drape_fabric_loss(const drape_fabric *fabric)
 double drape_fabric_frequency(const drape_fabric *fabric)
 {
     const double b = sqrt(fabric->bending.warp * fabric->bending.weft);
-    return sqrt(GRAVITY / cbrt(b / (fabric->areal_density * GRAVITY)));
+    return sqrt(GRAVITY / drape_pow(b / (fabric->areal_density * GRAVITY), 1.0 / 3));
 }
 
 /* A strip with the stretch l = 1 + e has the force l S, S = C(e) (l^2 - 1)/2, per width at rest, with the

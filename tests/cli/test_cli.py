@@ -1003,9 +1003,9 @@ def variants():
     yield False, scene(material={"young_modulus": 1e5, "poisson_ratio": -1, "thickness": 1e-3, "density": 200})
     fabric = {"fabric": "wang2011_denim"}
     stiff = {"young_modulus": 1e5, "thickness": 1e-3}
-    for more in ({}, stiff, {"areal_density": 0.3}, {**stiff, "density": 200}, {"poisson_ratio": 0.1}, {"mass": "uniform"}):
+    for more in ({}, {"damping": "none"}, {"damping": "fabric"}, stiff, {"areal_density": 0.3}, {**stiff, "density": 200}, {"poisson_ratio": 0.1}, {"mass": "uniform"}):
         yield True, scene(material={**fabric, **more})
-    for more in ({"young_modulus": 1e5}, {"thickness": 1e-3}, {"areal_density": 0.3, "total_mass": 1}, {"fabric": "denim"}, {"fabric": "none"}):
+    for more in ({"young_modulus": 1e5}, {"thickness": 1e-3}, {"areal_density": 0.3, "total_mass": 1}, {"fabric": "denim"}, {"fabric": "none"}, {"damping": "no"}, {"damping": 0.1}):
         yield False, scene(material={**fabric, **more})
     yield True, scene(material={**stiff, "fabric": "none", "density": 200})
     yield False, scene(material={**stiff, "fabric": "none"})
@@ -1054,8 +1054,44 @@ def test_fabric():
     equal(found["tension"]["shear"], 104.759674, "what stretch.cst takes")
     assert re.search(r"\n      tension\n(        .*\n)*        shear +104\.759674 N/m\n", good("info", "scene.json"))
     assert abs(found["areal_density"] - 0.22) < 1e-12 and abs(found["flexural_rigidity"] / (125.409805e-6 / 4 * 9 / 8) - 1) < 1e-6, found
+    write_scene(material={"fabric": "wang2011_pants", "damping": "nothing"})
+    refused("info", "scene.json", says='"nothing" is not allowed; damping is one of: fabric, none')
     write_scene(material={"fabric": "wang2011_pants", "thickness": 1e-3})
     refused("info", "scene.json", says="/cloth/0/material: \"young_modulus\" is missing")
+
+
+def test_dissipation():
+    """check lists what dissipates, and warns of cloth that only the method damps; a fabric has its loss unless the scene says otherwise"""
+
+    def losses(integrator=None, extra=None, **changes):
+        write_scene(**{"integrator": integrator or {"dt": 0.01}, **(extra or {}), **changes})
+        result = drape("check", "scene.json")
+        equal(result.returncode, 0, result.stderr)
+        lines = result.stdout.split("dissipates           by\n")[1].splitlines()
+        return {line[:21].strip(): line[21:] for line in lines}, result.stderr
+
+    woven = {"terms": ["stretch.cst", "bend.midedge"]}
+    pants = {"fabric": "wang2011_pants"}
+    found, said = losses(material=pants, **woven)
+    equal((found, said), ({"sheet": "damp.kelvin_voigt of its fabric, beta 0.00499 s", "be": "what its steps do not resolve"}, ""), "a fabric")
+    found, said = losses(material={**pants, "damping": "none"}, **woven)
+    equal(found["sheet"], "nothing", "an elastic sheet")
+    equal(said.count("warning: /cloth/0: only the method, be, damps the waves of sheet, so how long they last depends on its steps"), 1, said)
+    found, said = losses({"method": "midpoint", "dt": 0.01}, material={**pants, "damping": "none"}, **woven)
+    equal(list(found), ["sheet"], "midpoint")
+    equal(said.count("warning: /cloth/0: nothing damps the waves of sheet, so they last"), 1, said)
+    for damping, count in ((0, 1), (0.2, 2)):
+        found, said = losses({"method": "verlet", "dt": 0.01, "damping": damping}, material={**pants, "damping": "none"}, **woven)
+        equal((len(found), "the method, verlet," in said), (count, damping > 0), said)
+    found, said = losses({"method": "static"}, material={**pants, "damping": "none"}, **woven)
+    equal((found, said), ({"sheet": "nothing"}, ""), "nothing moves")
+    own = ["stretch.curve", {"type": "bend.midedge", "poisson": 0, "friction": 20, "friction_curvature": 4}, {"type": "drag.viscous", "coefficient": 0.1}]
+    ball = {"type": "sphere", "center": [0, -1, 0], "radius": 0.3, "friction": 0.3, "restitution": 1}
+    found, said = losses(material=pants, terms=own, extra={"colliders": [ball], "self_contact": {"thickness": 1e-3}})
+    equal(found, {"sheet": "bend.midedge, drag.viscous", "contact": "friction, impacts", "be": "what its steps do not resolve"}, "own losses")
+    equal(said, "", "own losses")
+    found, said = losses(terms=["stretch.cst", {"type": "relax.maxwell", "fraction_1": 0.1, "time_1": 1}])
+    equal((found["sheet"], said), ("relax.maxwell", ""), "relaxation")
 
 
 def test_cs184():

@@ -60,8 +60,8 @@ static double ring(const drape_fabric *f, const char *damping, double eta, doubl
 }
 
 /* The first frequency of the strip is right to delta, 0.5 % (beam_frequency of `drape validate`). The rate of
- * Kelvin-Voigt damping is beta omega^2/2, so eta is off by twice that; and the end of the last cycle by CYCLES
- * delta, where the energy falls as in the mean only to eta/2 sin 2 omega t: once more delta. */
+ * Kelvin-Voigt damping is beta omega^2/2, so eta is off by twice that; and the last cycle ends by CYCLES
+ * delta off, where the energy is off its mean course by eta/2 sin 2 omega t: once more delta. */
 START_TEST(a_strip_loses_what_the_fabric_says)
 {
     static const char *const names[] = {"matsudaira2015_wool", "matsudaira2015_broad", "feng2022_18",
@@ -137,7 +137,7 @@ START_TEST(own_losses_replace_that_of_a_fabric)
     ck_assert(time > 3e-3 && time < 6e-3);
     ck_assert_double_eq(time_of(WOOL, "'stretch.edge', 'bend.hinge'"), time);
     ck_assert_double_eq(time_of(WOOL ", 'damping': 'fabric'", "'stretch.cst', 'bend.midedge'"), time);
-    /* air is not of the fabric, nor are springs without dashpots; a given stiffness is still that of a fabric */
+    /* air is not of the fabric, springs without dashpots lose nothing, and a given stiffness is no loss */
     ck_assert_double_eq(time_of(WOOL, "'stretch.cst', {'type': 'drag.viscous', 'coefficient': 1}"), time);
     ck_assert_double_eq(time_of(WOOL, "{'type': 'spring.structural', 'stiffness': 20}"), time);
     ck_assert_double_eq(time_of(WOOL ", 'young_modulus': 1e5, 'thickness': 1e-3", "'stretch.cst'"), time);
