@@ -13,9 +13,14 @@ _Static_assert(LANES == DRAPE_LANES, "terms with lanes fill one vector");
 
 /* ---- Forces on measures ---- */
 
-bool drape_block_has_rates(const drape_term *term)
+static int law_count(const drape_term *term, const drape_request *want)
 {
-    return term->law_count > 0 || term->damping;
+    return want->lossless ? term->own_law_count : term->law_count;
+}
+
+bool drape_block_has_rates(const drape_term *term, const drape_request *want)
+{
+    return law_count(term, want) > 0 || term->damping;
 }
 
 /* q' = w q + history: the rates of step methods. */
@@ -73,7 +78,7 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
         b->force[i] += c[i] * b->rate[i];
         b->by_rate[i] = c[i];
     }
-    for (int i = 0; i < term->law_count; i++) {
+    for (int i = 0; i < law_count(term, want); i++) {
         const drape_term *law = term->laws[i];
         if (law->ops->dissipative ? want->dissipative : want->conservative)
             law->ops->law(law->params, b->count, k, b->strain, b->rate, b->force, b->by_strain, b->by_rate,
@@ -117,14 +122,14 @@ static void weigh(const drape_term *term, const drape_request *want, drape_block
 /* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
 bool drape_block_is_nonsymmetric(const drape_term *term, const drape_request *want)
 {
-    return drape_block_has_rates(term) && want->dissipative && !want->point->history && !want->velocity &&
-           !want->positive_share;
+    return drape_block_has_rates(term, want) && want->dissipative && !want->point->history &&
+           !want->velocity && !want->positive_share;
 }
 
 void drape_block_stress(const drape_term *term, const drape_request *want, drape_block *b,
                         const double *ahead)
 {
-    if (drape_block_has_rates(term) && want->point->history)
+    if (drape_block_has_rates(term, want) && want->point->history)
         rates_of_history(term, want, b);
     sum_stresses(term, want, b);
     if (want->stress)
@@ -193,9 +198,9 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
     term->ops->pair(&term->elements, b->first, b->count, want->point->x, b->q, compact, b->per_length);
     for (int r = 0; r < 3; r++)
         memcpy(p.d[r], compact + r * b->count, (size_t)b->count * sizeof *compact);
-    if (drape_block_has_rates(term) && want->point->history)
+    if (drape_block_has_rates(term, want) && want->point->history)
         rates_of_history(term, want, b);
-    else if (drape_block_has_rates(term))
+    else if (drape_block_has_rates(term, want))
         pairs_along(term, want->point->v, b, &p, b->rate);
     sum_stresses(term, want, b);
     if (want->stress) {
@@ -354,9 +359,9 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
     const int d = 3 * term->elements.nodes;
     b->stride = LANES;
     measure(term, want, b);
-    if (drape_block_has_rates(term) && want->point->history)
+    if (drape_block_has_rates(term, want) && want->point->history)
         rates_of_history(term, want, b);
-    else if (drape_block_has_rates(term))
+    else if (drape_block_has_rates(term, want))
         measures_along(term, want->point->v, b, b->rate);
     sum_stresses(term, want, b);
     if (want->stress) {

@@ -23,6 +23,7 @@ typedef struct drape_request {
     double positive_share;       /* how much of the positive semidefinite part, see drape_system_jacobian */
     bool velocity;               /* the Hessian wanted is dg/dv alone */
     bool remainder;              /* only what belongs to no measure */
+    bool lossless;               /* without the losses of measured fabrics */
     bool momentum;               /* only the energies of motion and, in place of forces, their momenta */
     const double *along;         /* (node_count x 3) displacement of the nodes; NULL: none */
     double *stress;              /* (measure_count) gets the forces on measures; NULL: not wanted */
@@ -66,7 +67,7 @@ static inline size_t drape_block_start(const drape_block *b, int32_t i, int numb
 }
 
 /* Whether the forces on the measures of a term depend on their rates. */
-bool drape_block_has_rates(const drape_term *term);
+bool drape_block_has_rates(const drape_term *term, const drape_request *want);
 
 /* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
 bool drape_block_is_nonsymmetric(const drape_term *term, const drape_request *want);

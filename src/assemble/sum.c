@@ -19,7 +19,7 @@ struct drape_summer {
     const drape_model *model;
     drape_pool *pool; /* the system's; NULL: one thread */
     int threads;
-    bool unconstrained;
+    bool unconstrained, lossless;
     drape_block *blocks;      /* (threads) */
     reach **reaches;          /* (term_count) of the blocks of each term's pieces; NULL: one thread */
     reach **patches;          /* (term_count) of the blocks of its patches; NULL: one thread */
@@ -97,6 +97,18 @@ void drape_summer_leave_constraints(drape_summer *s)
 bool drape_summer_leaves(const drape_summer *s, const drape_term *term)
 {
     return s->unconstrained && term->ops->constraint;
+}
+
+void drape_summer_leave_losses(drape_summer *s)
+{
+    s->lossless = true;
+}
+
+static drape_request as_left(const drape_summer *s, const drape_request *want)
+{
+    drape_request left = *want;
+    left.lossless = s->lossless;
+    return left;
 }
 
 /* ---- Adding a block of elements ---- */
@@ -255,7 +267,7 @@ static bool is_wanted(const drape_summer *s, int32_t number, const drape_request
     if (term->ops->measure && want->remainder)
         return false;
     if (term->ops->measure)
-        return want->conservative || term->law_count > 0 || term->damping;
+        return want->conservative || drape_block_has_rates(term, want);
     return term->ops->dissipation ? want->dissipative || (term->ops->kinetic && want->conservative)
                                   : want->conservative;
 }
@@ -369,7 +381,8 @@ static void add_task(void *user, int64_t thread)
 /* The shares are tasks of the pool, not threads: the pool may have fewer threads than there are shares. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-    order o = {s, want, to};
+    const drape_request left = as_left(s, want);
+    order o = {s, &left, to};
     prepare_parts(s, &o);
     drape_parallel(s->pool, s->threads, add_task, &o);
 }
@@ -389,7 +402,8 @@ static void stress_task(void *user, int64_t thread)
 
 void drape_summer_stress(drape_summer *s, const drape_request *want)
 {
-    order o = {.summer = s, .want = want};
+    const drape_request left = as_left(s, want);
+    order o = {.summer = s, .want = &left};
     prepare_parts(s, &o);
     drape_parallel(s->pool, s->threads, stress_task, &o);
 }
@@ -400,9 +414,10 @@ static bool is_counted(const drape_term *term, int32_t piece)
     return !term->counted || term->counted[piece];
 }
 
-void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,
+void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *asked,
                            const drape_sums *to, double *energy)
 {
+    const drape_request left = as_left(s, asked), *want = &left;
     const share all = {0, s->model->node_count};
     const drape_parts_work *work = s->parts[term - s->model->terms];
     const drape_patches *p = &term->patches;
@@ -436,7 +451,8 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
 
 double drape_summer_turning_power(drape_summer *s, const drape_term *term, const drape_request *want)
 {
-    prepare_term(s, term, want);
+    const drape_request left = as_left(s, want);
+    prepare_term(s, term, &left);
     return drape_parts_turning_power(term, want->point, s->parts[term - s->model->terms]);
 }
 

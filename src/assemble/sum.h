@@ -29,6 +29,8 @@ drape_status drape_summer_create(drape_arena *arena, const drape_model *model, d
 
 /* From now on, terms that are constraints are left out. */
 void drape_summer_leave_constraints(drape_summer *summer);
+/* From now on, the losses of measured fabrics are left out. */
+void drape_summer_leave_losses(drape_summer *summer);
 bool drape_summer_leaves(const drape_summer *summer, const drape_term *term);
 
 /* Overwrites the sums in `to` with those over all terms. */

@@ -109,6 +109,11 @@ void drape_system_leave_constraints(drape_system *system)
     drape_summer_leave_constraints(system->summer);
 }
 
+void drape_system_leave_losses(drape_system *system)
+{
+    drape_summer_leave_losses(system->summer);
+}
+
 const drape_model *drape_system_model(const drape_system *system)
 {
     return system->model;

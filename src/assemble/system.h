@@ -52,6 +52,10 @@ void drape_system_destroy(drape_system **system); /* stops the threads; call it 
  * enforce constraints by moving nodes. */
 void drape_system_leave_constraints(drape_system *system);
 
+/* From now on, the losses of measured fabrics are left out. For explicit integrators, whose steps would have
+ * to resolve them. */
+void drape_system_leave_losses(drape_system *system);
+
 const drape_model *drape_system_model(const drape_system *system);
 /* Its thread pool, for callers that work on what it assembles; NULL: one thread. */
 drape_pool *drape_system_pool(const drape_system *system);

@@ -28,7 +28,7 @@ drape_parts_work *drape_parts_create(drape_arena *arena, const drape_term *term)
     w->by_rate = by_element + 3 * elements;
     w->energy = by_element + 4 * elements;
     w->ds = drape_arena_take(arena, numbers, sizeof *w->ds);
-    w->turn = drape_arena_take(arena, drape_block_has_rates(term) ? numbers : 0, sizeof *w->turn);
+    w->turn = drape_arena_take(arena, term->law_count > 0 || term->damping ? numbers : 0, sizeof *w->turn);
     return w;
 }
 
@@ -107,7 +107,7 @@ void drape_parts_measure(const drape_term *term, const drape_request *want, int3
                   last = first + DRAPE_BLOCK < p->count ? first + DRAPE_BLOCK : p->count;
     const double *internal = drape_term_own(term, want->point->internal);
     const bool turns = want->hessian && drape_block_is_nonsymmetric(term, want);
-    const bool rates = drape_block_has_rates(term) && !want->point->history && want->point->v;
+    const bool rates = drape_block_has_rates(term, want) && !want->point->history && want->point->v;
     for (int32_t i = first; i < last; i += LANES) {
         int32_t number[LANES];
         double s[LANES], v[3 * NODES], w[3];
@@ -154,7 +154,7 @@ void drape_parts_stress(const drape_term *term, const drape_request *want, int32
 {
     const drape_parts *p = term->elements.parts;
     const int32_t left = term->elements.count - block * DRAPE_BLOCK;
-    const bool rates = drape_block_has_rates(term) && !want->point->history;
+    const bool rates = drape_block_has_rates(term, want) && !want->point->history;
     double ahead[DRAPE_BLOCK] = {0};
     b->first = block * DRAPE_BLOCK;
     b->count = left < DRAPE_BLOCK ? left : DRAPE_BLOCK;

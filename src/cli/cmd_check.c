@@ -46,6 +46,11 @@ static bool is_lossy(const drape_model *m, const drape_term *t)
     return t->ops->dissipative || t->damping || t->sliders > 0 || (relaxes && t->seam < 0);
 }
 
+static bool is_of_fabric(const drape_model *m, const drape_term *t)
+{
+    return t->ops->from_fabric && m->cloths[t->cloth].retardation > 0;
+}
+
 /* Lists what dissipates of each cloth, of seams, of contact and by the method, and warns of cloths of which
  * only the method takes energy: how soon these come to rest depends on its steps. */
 static void check_losses(const cli_scene *in)
@@ -59,27 +64,34 @@ static void check_losses(const cli_scene *in)
     printf("%-20s %s\n", "dissipates", "by");
     for (int32_t c = 0; c < m->cloth_count; c++, begun = false) {
         const char *name = m->cloths[c].name;
+        const drape_term *left = NULL;
         for (int32_t i = 0; i < m->term_count; i++) {
             const drape_term *t = &m->terms[i];
-            if (t->cloth == c && t->seam < 0 && is_lossy(m, t))
-                print_loss(
-                    CLI_SHOWN(name),
-                    t->ops->from_fabric && m->cloths[c].retardation > 0
-                        ? DRAPE_FORMAT("%s of its fabric, beta %.3g s", t->ops->entry.name, t->params[0])
-                        : t->ops->entry.name,
-                    &begun);
+            if (t->cloth != c || t->seam >= 0 || !is_lossy(m, t))
+                continue;
+            if (is_of_fabric(m, t) && chosen->integrator->leaves_losses)
+                left = t;
+            else
+                print_loss(CLI_SHOWN(name),
+                           is_of_fabric(m, t) ? DRAPE_FORMAT("%s of its fabric, beta %.3g s",
+                                                             t->ops->entry.name, t->params[0])
+                                              : t->ops->entry.name,
+                           &begun);
         }
         const bool none = !begun;
         if (none)
             print_loss(CLI_SHOWN(name), "nothing", &begun);
+        if (left)
+            printf(": %s leaves out %s of its fabric", method, left->ops->entry.name);
         putchar('\n');
         fflush(stdout);
         if (none && !chosen->integrator->steady_state)
             fprintf(stderr,
-                    "warning: /cloth/%d: %s damps the waves of %s, so %s; damp.kelvin_voigt, or a \"fabric\" "
-                    "without \"damping\": \"none\", does\n",
+                    "warning: /cloth/%d: %s damps the waves of %s, so %s; damp.kelvin_voigt, or %s, does\n",
                     (int)c, damps ? DRAPE_FORMAT("only the method, %s,", method) : "nothing", CLI_SHOWN(name),
-                    damps ? "how long they last depends on its steps" : "they last");
+                    damps ? "how long they last depends on its steps" : "they last",
+                    left ? "the loss of its fabric under an implicit method"
+                         : "a \"fabric\" without \"damping\": \"none\"");
     }
     for (int32_t i = 0; i < m->term_count; i++)
         if (m->terms[i].seam >= 0 && is_lossy(m, &m->terms[i]))

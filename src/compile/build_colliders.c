@@ -77,8 +77,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
         status = drape_check_cancel(model->ctx) ? DRAPE_E_STOPPED : compile_collider(model, i, def);
     model->collider_count = status ? 0 : (int32_t)def->collider_count;
     for (int32_t i = 0; i < model->collider_count; i++)
-        model->has_dissipation =
-            model->has_dissipation || model->colliders[i].friction > 0 || model->colliders[i].restitution < 1;
+        if (model->colliders[i].friction > 0 || model->colliders[i].restitution < 1)
+            model->has_dissipation = model->has_own_dissipation = true;
     return status;
 }
 

@@ -273,8 +273,8 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
         contact->self_thickness = all[1][DRAPE_SELF_THICKNESS];
         contact->self_friction = all[1][DRAPE_SELF_FRICTION];
         contact->self_restitution = all[1][DRAPE_SELF_RESTITUTION];
-        model->has_dissipation =
-            model->has_dissipation || contact->self_friction > 0 || contact->self_restitution < 1;
+        if (contact->self_friction > 0 || contact->self_restitution < 1)
+            model->has_dissipation = model->has_own_dissipation = true;
     }
     if (def->untangle)
         model->untangle =

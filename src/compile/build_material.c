@@ -56,7 +56,7 @@ static const drape_param params[] = {
     [DAMPING] = DRAPE_CHOICE(
         "damping", DAMPING_FABRIC, damping_choices,
         "of a fabric. fabric: damp.kelvin_voigt by its measured loss, unless a term of the cloth "
-        "dissipates within it; none: an elastic sheet"),
+        "dissipates within it; verlet leaves it out; none: an elastic sheet"),
     [FIRST_CURVE + DRAPE_CURVE_WARP] =
         DRAPE_POINTS("warp_curve", "1", DRAPE_DERIVED("of the fabric, or a straight line"), 1e-9, MAX_STRAIN,
                      "tension of a strip along the warp, its sides free: strain and force per width in N/m, "

@@ -112,7 +112,8 @@ static drape_status begin_term(drape_model *model, int32_t c, int32_t seam, cons
     term->elements.factor = 1;
     term->first_internal = term->first_measure = term->first_slider = term->first_branch = -1;
     model->term_count++;
-    model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
+    if (term->ops->dissipative || term->ops->dissipation)
+        model->has_dissipation = model->has_own_dissipation = true;
     model->has_kinetic = model->has_kinetic || term->ops->kinetic;
     return DRAPE_OK;
 }
@@ -143,7 +144,8 @@ static void find_damping(drape_model *model, drape_term *term)
     for (int32_t e = 0; c && !term->damping && e < el->count; e++)
         term->damping = c[e] != 0 ? c : NULL;
     model->has_laws = model->has_laws || term->damping;
-    model->has_dissipation = model->has_dissipation || term->damping;
+    if (term->damping)
+        model->has_dissipation = model->has_own_dissipation = true;
 }
 
 static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
@@ -210,7 +212,9 @@ static drape_status build_loss(drape_model *model, int32_t c)
             continue;
         const drape_setting setting = {.name = ops->entry.params[0].name, .number = cloth->retardation};
         const drape_entry_def def = {.type = ops->entry.name, .settings = &setting, .setting_count = 1};
+        const bool own = model->has_own_dissipation;
         DRAPE_TRY(build_term(model, c, DRAPE_FORMAT("/cloth/%d/material", (int)c), ops, &def));
+        model->has_own_dissipation = own;
     }
     return DRAPE_OK;
 }
@@ -310,6 +314,7 @@ static drape_status connect_laws(drape_model *model, int32_t c)
         measured = true;
         term->laws = cloth->laws;
         term->law_count = cloth->law_count;
+        term->own_law_count = cloth->law_count - (cloth->retardation > 0);
         term->branches = cloth->branches;
         term->branch_count = cloth->branch_count;
     }

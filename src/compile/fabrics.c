@@ -41,6 +41,8 @@
 #define SWEEP   250.0   /* [1/m] curvature, of either sign, to which KES-FB2 bends (Kawabata 1980) */
 #define GRAVITY 9.80665 /* [m/s2] */
 
+#define CANTILEVER 3.5160152685 /* square of the first root of cosh x cos x = -1 */
+
 /* clang-format off */
 #define ENTRY(name, what, source, density, warp, weft, coupling, shear, far_warp, far_weft, bend_warp,       \
               bend_weft, diagonal, friction, drape) \
@@ -88,13 +90,13 @@ double drape_fabric_loss(const drape_fabric *fabric)
     return isnan(friction) ? LOSS : 4 / DRAPE_PI * friction / (fabric->bending.warp * SWEEP + friction);
 }
 
-/* c = (B/(rho g))^(1/3) is the length at which a sheet is as stiff by its weight as by its bending, so that
- * folds have lengths near 2 pi c; bending waves of this length have the frequency sqrt(B/rho)/c^2 =
- * sqrt(g/c). */
+/* c = (B/(rho g))^(1/3) is the length at which a sheet is as stiff by its weight as by its bending. A strip
+ * of this length that is clamped at one end has the first frequency 3.516 sqrt(B/rho)/c^2 = 3.516 sqrt(g/c).
+ */
 double drape_fabric_frequency(const drape_fabric *fabric)
 {
     const double b = sqrt(fabric->bending.warp * fabric->bending.weft);
-    return sqrt(GRAVITY / drape_pow(b / (fabric->areal_density * GRAVITY), 1.0 / 3));
+    return CANTILEVER * sqrt(GRAVITY / drape_pow(b / (fabric->areal_density * GRAVITY), 1.0 / 3));
 }
 
 /* A strip with the stretch l = 1 + e has the force l S, S = C(e) (l^2 - 1)/2, per width at rest, with the

@@ -30,8 +30,9 @@ void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
 
 /* The loss factor [1], what a cycle loses over 2 pi times what it stores, and the frequency [rad/s] at which
- * the fabric has it in the model, that of its folds. Their ratio is the retardation time of Kelvin-Voigt
- * damping [s], whose loss factor is proportional to the frequency. */
+ * the fabric has it in the model, that of a cantilever as long as bending and weight are equally stiff. Their
+ * ratio is the retardation time of damp.kelvin_voigt [s], whose loss factor is proportional to the
+ * frequency. */
 double drape_fabric_loss(const drape_fabric *fabric);
 double drape_fabric_frequency(const drape_fabric *fabric);
 

@@ -66,6 +66,9 @@ typedef struct drape_integrator_ops {
     bool steady_state;
     /* It damps nothing by itself: waves that its steps do not resolve persist. */
     bool conservative;
+    /* It is explicit, and its steps would have to resolve the losses of measured fabrics, so these must not
+     * act: the sim creates its system without them. */
+    bool leaves_losses;
     /* It enforces contact and limits by moving nodes, so the forces that stand for them (contact of the
      * model, terms that are a constraint) must not act, too: the sim creates its system without them. */
     bool projects_contact;

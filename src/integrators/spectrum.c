@@ -163,5 +163,5 @@ void drape_spectrum_largest(drape_spectrum *s, const drape_state *at, double *om
     memset(s->v, 0, s->nodes * sizeof *s->v);
     drape_system_force(s->system, &rest, s->g0);
     *omega = sqrt(fmax(0, largest(s, at, s->x, at->x)));
-    *damping = s->model->has_dissipation ? fmax(0, largest(s, at, s->v, NULL)) : 0;
+    *damping = s->model->has_own_dissipation ? fmax(0, largest(s, at, s->v, NULL)) : 0;
 }

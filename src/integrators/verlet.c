@@ -133,7 +133,7 @@ static drape_status create_arrays(drape_arena *arena, verlet_state *s)
     double **const always[] = {&s->g, &s->g1, &s->x0, &s->pins, &s->inverse};
     for (size_t i = 0; i < sizeof always / sizeof *always; i++)
         *always[i] = drape_arena_take(arena, nodes, sizeof(double));
-    if (m->has_dissipation) {
+    if (m->has_own_dissipation) {
         s->v_ahead = drape_arena_take(arena, nodes, sizeof(double));
         s->dissipated = drape_arena_take(arena, nodes, sizeof(double));
     }
@@ -494,6 +494,7 @@ const drape_integrator_ops drape_integrator_verlet = {
               DRAPE_PARAMS(params)},
     .order = 2,
     .conservative = true,
+    .leaves_losses = true,
     .create = create,
     .projects_contact = true,
     .in_space = true,

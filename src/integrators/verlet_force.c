@@ -59,7 +59,8 @@ static drape_status create_runs(drape_arena *arena, drape_verlet_force *f)
     const drape_model *m = f->model;
     for (int32_t i = 0; i < m->term_count; i++) {
         const drape_term *term = &m->terms[i];
-        f->summed[i] = term->ops->distance && term->law_count == 0 && !term->damping && term->sliders == 0 &&
+        f->summed[i] = term->ops->distance && term->own_law_count == 0 && !term->damping &&
+                       term->sliders == 0 &&
                        find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
         f->run_count += f->summed[i] ? find_runs(&term->elements, NULL) : 0;
     }

@@ -57,6 +57,7 @@ typedef struct drape_term {
     int64_t first_measure;                /* index of its measures in the list of all measures; -1: none */
     const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
+    int own_law_count;      /* of these, without the loss of a measured fabric, which is the last */
     const double *damping;  /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
     const uint8_t *counted; /* (elements.count) 1: their energies count here, 0: on another rank; NULL: all */
     const int32_t *element; /* (elements.count) their numbers in the whole model; NULL: the same */
@@ -433,10 +434,11 @@ struct drape_model {
     drape_model_untangle untangle;
     drape_choice untangle_choice;
     int64_t internal_count, measure_count;
-    bool has_laws;        /* some term needs the rates of measures */
-    bool has_dissipation; /* some term dissipates energy */
-    bool has_branches;    /* some measure has Maxwell branches */
-    bool has_kinetic;     /* some term has an energy of motion */
+    bool has_laws;            /* some term needs the rates of measures */
+    bool has_dissipation;     /* some term dissipates energy */
+    bool has_own_dissipation; /* the same without the losses of measured fabrics */
+    bool has_branches;        /* some measure has Maxwell branches */
+    bool has_kinetic;         /* some term has an energy of motion */
     drape_pattern pattern;
     size_t pattern_bytes; /* bytes of the pattern in the arena */
     double length;        /* diagonal of the rest bounding box [m], > 0 */

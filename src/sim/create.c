@@ -68,6 +68,8 @@ static drape_status create_system(drape_sim *sim, int threads)
     if (status)
         return status;
     drape_system_watch(sim->system, &sim->cancel);
+    if (sim->chosen.integrator->leaves_losses)
+        drape_system_leave_losses(sim->system);
     if (!sim->chosen.integrator->projects_contact) {
         status = drape_system_add_contact(sim->system);
         if (!status && !sim->chosen.integrator->own_steps)
