@@ -528,7 +528,8 @@ typedef struct drape_term_ops {
     bool periodic;
 
     /* law: the loss of a measured fabric adds this term to its cloth, unless a term of the cloth dissipates
-     * within it. Its first parameter is a retardation time [s], the only one that it requires. */
+     * within it. Its first parameter is a retardation time [s], the only one that it requires. "verlet"
+     * leaves it out. */
     bool from_fabric;
 } drape_term_ops;
 
