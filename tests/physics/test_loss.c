@@ -62,7 +62,7 @@ static double ring(const drape_fabric *f, const char *damping, double eta, doubl
 /* The first frequency of the strip is right to delta, 0.5 % (beam_frequency of `drape validate`). The rate of
  * Kelvin-Voigt damping is beta omega^2/2, so eta is off by twice that; and the last cycle ends by CYCLES
  * delta off, where the energy is off its mean course by eta/2 sin 2 omega t: once more delta. */
-START_TEST(a_strip_loses_what_the_fabric_says)
+TEST(a_strip_loses_what_the_fabric_says)
 {
     static const char *const names[] = {"matsudaira2015_wool", "matsudaira2015_broad", "feng2022_18",
                                         "wang2011_tshirt"};
@@ -80,21 +80,19 @@ START_TEST(a_strip_loses_what_the_fabric_says)
         ck_assert_double_eq_tol(left + dissipated, 1, 1e-3); /* midpoint: (omega h)^2/4 */
     }
 }
-END_TEST
 
 /* midpoint conserves quadratic energies; that of bending is quartic in the tip's 0.1 %. */
-START_TEST(an_elastic_sheet_loses_nothing)
+TEST(an_elastic_sheet_loses_nothing)
 {
     double dissipated;
     ck_assert_double_eq_tol(ring(find("matsudaira2015_wool"), ", 'damping': 'none'", 0, &dissipated), 1,
                             1e-5);
     ck_assert_double_eq(dissipated, 0);
 }
-END_TEST
 
 /* The loss factors of published loops, 4/pi HB/(250 B + HB) of B and 2HB in gf cm2/cm and gf cm/cm; of others
  * the median of these. Frequencies of strips of one to three centimetres. */
-START_TEST(losses_are_those_published)
+TEST(losses_are_those_published)
 {
     ck_assert_double_eq_tol(drape_fabric_loss(find("matsudaira2015_wool")),
                             4 / DRAPE_PI * 0.0165 / (2.5 * 0.067 + 0.0165), 1e-12);
@@ -110,7 +108,6 @@ START_TEST(losses_are_those_published)
         ck_assert(hertz > 9 && hertz < 20 && drape_fabric_loss(f) > 0.05 && drape_fabric_loss(f) < 0.3);
     }
 }
-END_TEST
 
 /* The retardation time that acts on a cloth; 0: none. */
 static double time_of(const char *material, const char *terms)
@@ -130,7 +127,7 @@ static double time_of(const char *material, const char *terms)
 
 #define WOOL "'fabric': 'matsudaira2015_wool'"
 
-START_TEST(own_losses_replace_that_of_a_fabric)
+TEST(own_losses_replace_that_of_a_fabric)
 {
     const drape_fabric *wool = find("matsudaira2015_wool");
     const double time = drape_fabric_loss(wool) / drape_fabric_frequency(wool);
@@ -153,7 +150,6 @@ START_TEST(own_losses_replace_that_of_a_fabric)
     ck_assert_double_eq(time_of("'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200", "'stretch.cst'"),
                         0);
 }
-END_TEST
 
 /* The energy that a falling sheet dissipates under verlet, and in *position a number of where it ends. */
 static double dissipated_by_verlet(const char *material, const char *terms, double *position)
@@ -173,7 +169,7 @@ static double dissipated_by_verlet(const char *material, const char *terms, doub
 }
 
 /* The same bits as of an elastic sheet, with air and without; a law that the scene names acts. */
-START_TEST(verlet_leaves_the_loss_of_a_fabric)
+TEST(verlet_leaves_the_loss_of_a_fabric)
 {
     static const char *const terms[] = {
         "'stretch.edge', 'bend.hinge'", "'stretch.cst', 'bend.midedge'",
@@ -188,7 +184,3 @@ START_TEST(verlet_leaves_the_loss_of_a_fabric)
     ck_assert(dissipated_by_verlet(WOOL, "'stretch.edge', {'type': 'damp.kelvin_voigt', 'beta': 1e-5}",
                                    &fabric) > 0);
 }
-END_TEST
-
-SUITE("loss", verlet_leaves_the_loss_of_a_fabric, a_strip_loses_what_the_fabric_says,
-      an_elastic_sheet_loses_nothing, losses_are_those_published, own_losses_replace_that_of_a_fabric)
