@@ -17,6 +17,7 @@ typedef struct trial {
     drape_sim *sim;         /* NULL: there is none */
     double *x;              /* (frames x nodes x 3) [m] */
     int64_t frames, wanted; /* that there are; after which it rests, while it is compared with */
+    drape_status status;    /* with which it ended */
     bool compares;          /* with the one before */
     bool rests, given_up, over;
 } trial;
@@ -32,7 +33,7 @@ typedef struct accurate {
     double end;
     int64_t most;            /* frames */
     double *largest, *times; /* (most) how far apart the last two runs are until each [1], [s] */
-    trial trials[2], *now, *before;
+    trial trials[2], *now, *before, dropped; /* the last: given up, but the host still has its sim */
     drape_accuracy *report;
 } accurate;
 
@@ -68,8 +69,7 @@ static void advance_trial(trial *t, int64_t frames)
         t->rests = false;
         const drape_status status = drape_sim_advance(t->sim, t->of->end);
         t->over = !t->rests;
-        if (status && !t->rests)
-            break;
+        t->status = t->over ? status : DRAPE_OK;
     }
 }
 
@@ -146,6 +146,11 @@ static drape_status begin_trial(accurate *a, const drape_sim_def *given)
         a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
     if (!status)
         status = a->prepare ? a->prepare(a->user, t->sim, a->report) : DRAPE_OK;
+    if (t->sim)
+        end_trial(a, &a->dropped);
+    a->report->error = a->report->distance = a->report->worst = NAN;
+    a->report->until = 0;
+    a->report->reached = false;
     return status ? status : drape_sim_observe(t->sim, watch, t);
 }
 
@@ -181,8 +186,8 @@ static void fill_report(accurate *a, bool whole)
         r->until = a->end;
 }
 
-/* The last run has parted from the one before: nothing says any more where the cloth is, and what follows is as
- * good by the cheapest method that was tried. */
+/* The last run has parted from the one before: nothing says any more where the cloth is, and what follows is
+ * as good by the cheapest method that was tried. */
 static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
 {
     const drape_level *fixed = &a->refinement.fixed;
@@ -190,6 +195,7 @@ static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
     drape_setting setting;
     drape_status status = DRAPE_OK;
     t->compares = t->rests = false;
+    a->refinement.level.most = INFINITY;
     if (a->refinement.level.controlled) {
         const size_t used = strlen(a->report->method);
         const drape_sim_def def = def_of(given, fixed, &setting);
@@ -202,30 +208,55 @@ static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
     return status ? status : drape_sim_advance(t->sim, a->end);
 }
 
+/* Compares the ends of both runs; false: one has not reached its end. */
+static bool compare_ends(accurate *a)
+{
+    trial *before = a->before, *t = a->now;
+    if (!t->compares || !t->over || t->status)
+        return false;
+    advance_trial(before, INT64_MAX);
+    if (!before->over || before->status)
+        return false;
+    drape_deviation_add(&a->apart, a->end, drape_sim_positions(t->sim), drape_sim_positions(before->sim));
+    a->largest[a->apart.frames - 1] = largest(a);
+    a->times[a->apart.frames - 1] = a->end;
+    return true;
+}
+
 /* One level after the other. */
 static drape_status refine(accurate *a, const drape_sim_def *given)
 {
     drape_status status = DRAPE_OK;
     for (bool more = true; more && !status;) {
-        status = begin_trial(a, given);
-        if (!status)
-            status = drape_sim_advance(a->now->sim, a->end);
         trial *t = a->now;
-        if (status && !t->rests && (status == DRAPE_E_STOPPED || !t->sim || drape_sim_time(t->sim) == 0))
-            return status; /* by the host, or at once */
-        const drape_status failure = t->rests ? DRAPE_OK : status;
+        status = begin_trial(a, given);
+        if (status)
+            return status;
+        const drape_status ended = drape_sim_advance(t->sim, a->end), failure = t->rests ? DRAPE_OK : ended;
         t->over = !t->rests;
-        fill_report(a, t->over && !failure && a->apart.frames == t->frames);
-        const drape_level_result result = {
-            .apart = a->apart.frames > 0 ? largest(a) : NAN,
-            .fraction =
-                t->over && !failure ? 1 : fmin(fmax(drape_sim_time(t->sim) / a->end, ROUNDING), 1 - ROUNDING),
-            .work = work_of(t->sim),
-            .given_up = t->given_up || failure};
+        t->status = failure;
+        if (failure == DRAPE_E_STOPPED || failure == DRAPE_E_MEMORY || failure == DRAPE_E_FILE)
+            return failure;
+        const bool whole = compare_ends(a);
+        if (a->before->status == DRAPE_E_STOPPED || a->before->status == DRAPE_E_MEMORY)
+            return a->before->status;
+        fill_report(a, whole);
+        const double time =
+            t->compares && a->apart.frames > 0 ? a->times[a->apart.frames - 1] : drape_sim_time(t->sim);
+        const drape_level_result result = {.apart = a->apart.frames > 0 ? largest(a) : NAN,
+                                           .fraction =
+                                               whole || (!t->compares && !failure && t->over)
+                                                   ? 1
+                                                   : fmin(fmax(time / a->end, ROUNDING), 1 - ROUNDING),
+                                           .work = work_of(t->sim),
+                                           .failed = failure != DRAPE_OK,
+                                           .given_up = t->given_up || failure};
         more = drape_refinement_next(&a->refinement, &result);
         status = more ? DRAPE_OK : failure;
         if (more && result.given_up) {
-            end_trial(a, t);
+            a->dropped = *t;
+            t->sim = NULL;
+            t->x = NULL;
         } else if (more) {
             trial *old = a->before;
             leave_trial(t);
@@ -258,6 +289,12 @@ drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
             "\"%s\" does not converge to the motion of the model, so it has no accuracy; leave "
             "it out, and a method is chosen",
             named->entry.name);
+    for (int32_t i = 0; i < m->event_count; i++)
+        if (m->events[i].action == DRAPE_ACTION_STOP)
+            return drape_fail_at(
+                ctx, DRAPE_E_ARGUMENT, DRAPE_FORMAT("/events/%d/action", (int)i),
+                "runs that an event stops have no common end to be compared at; leave \"stop\" "
+                "out, and find the event in the results");
     if (m->part)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "runs on several ranks are not repeated");
     return DRAPE_OK;
@@ -277,14 +314,14 @@ drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, 
     a.arena = drape_arena_of(ctx);
     a.now = &a.trials[0];
     a.before = &a.trials[1];
-    a.most = (int64_t)floor(a.end * model->frame_rate * (1 + ROUNDING)) + 2;
-    a.trials[0].of = a.trials[1].of = &a;
+    a.most = (int64_t)floor(a.end * model->frame_rate * (1 + ROUNDING)) + 2; /* and the end */
+    a.trials[0].of = a.trials[1].of = a.dropped.of = &a;
     drape_sim_def_init(&own, sizeof own);
     drape_status status = drape_accuracy_check(ctx, model);
     if (!status)
         status = drape_deviation_create(&a.arena, model, model, &a.apart);
-    a.largest = drape_arena_take(&a.arena, (size_t)a.most, sizeof *a.largest);
-    a.times = drape_arena_take(&a.arena, (size_t)a.most, sizeof *a.times);
+    a.largest = drape_arena_take(&a.arena, (size_t)a.most + 1, sizeof *a.largest);
+    a.times = drape_arena_take(&a.arena, (size_t)a.most + 1, sizeof *a.times);
     status = status ? status : drape_arena_status(&a.arena);
     if (!status) {
         double size = INFINITY;
@@ -295,10 +332,13 @@ drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, 
         report->asked = a.refinement.accuracy;
         status = refine(&a, def ? def : &own);
     }
-    *out = a.now->sim;
-    a.now->sim = NULL;
-    if (*out && (*out)->observer_count > 0) /* it is the host's now */
+    /* where there is no other, the host has that of the run before, or one that was given up */
+    trial *last = a.now->sim ? a.now : a.dropped.sim ? &a.dropped : a.before;
+    *out = last->sim;
+    last->sim = NULL;
+    if (*out && (*out)->observer_count > 0 && (*out)->observers[(*out)->observer_count - 1] == watch)
         (*out)->observer_count--;
+    end_trial(&a, &a.dropped);
     end_trial(&a, a.before);
     drape_arena_free(&a.arena);
     return status;

@@ -106,8 +106,8 @@ static bool whole_pair(const drape_refinement *l, const drape_level_result *r)
     return !isnan(l->before) && l->parted >= 1 && r->fraction >= 1;
 }
 
-/* Whether the present level agrees better with the one before than that did with its own: it is nearer, or, of
- * runs that were cut where they parted, for longer. */
+/* Whether the present level agrees better with the one before than that did with its own: it is nearer, or,
+ * of runs that were cut where they parted, for longer. */
 static bool converges(const drape_refinement *l, const drape_level_result *r)
 {
     if (isnan(r->apart) || isnan(l->before) || (l->parted < 1 && r->fraction >= 1))
@@ -122,6 +122,10 @@ bool drape_refinement_next(drape_refinement *l, const drape_level_result *r)
     const bool other = l->level.controlled && l->level.share == 1; /* than the one before */
     const double error = drape_refinement_error(l, r->apart, r->fraction >= 1);
     if (!r->given_up && r->fraction >= 1 && error <= l->accuracy)
+        return false;
+    l->failures = !r->failed ? 0 : l->failures > 0 && r->fraction > LONGER * l->failed ? 1 : l->failures + 1;
+    l->failed = r->fraction;
+    if (l->failures > MOST_STUCK)
         return false;
     l->stuck = converges(l, r) ? 0 : l->stuck + 1;
     if (l->level.controlled) {

@@ -27,6 +27,7 @@ typedef struct drape_level_result {
     double apart;    /* [1] largest distance to the level before; NAN: there is none */
     double fraction; /* of the run that was made */
     double work;   /* evaluations of the residual, and of the matrix with its factors, which count as four */
+    bool failed;   /* a step could not be made */
     bool given_up; /* it has done its work, or has failed */
 } drape_level_result;
 
@@ -43,6 +44,8 @@ typedef struct drape_refinement {
     double
         before; /* [1] how far the two levels before were apart; NAN: unknown, or they were of two methods */
     double parted; /* fraction of the run until which they were compared */
+    int failures;  /* in a row, at no later time */
+    double failed; /* fraction of the run at the last */
     int stuck;     /* levels in a row that are as far from the one before as that was from its own */
 } drape_refinement;
 

@@ -368,7 +368,7 @@ static int open_output(run *r)
     const cli_command *command = &r->request->command;
     const bool resumed = r->recorder != NULL;
     drape_status status = DRAPE_OK;
-    if (!r->request->out || r->accurate || drape_recorder_done(r->recorder).finished)
+    if (!r->request->out || drape_recorder_done(r->recorder).finished)
         return CLI_GO_ON;
     const bool copies = !resumed && !drape_scene_copy_is(command->operand, r->request->out);
     const drape_recorder_def def = recorder_def(r);
@@ -492,7 +492,7 @@ static void print_accuracy(const run *r)
         "%.3g m at t=%.4g s near (%.4g, %.4g, %.4g)\n",
         a->error, a->distance, CLI_SHOWN(r->in.model->cloths[a->cloth].name), (int)a->node, a->worst, a->time,
         a->place[0], a->place[1], a->place[2]);
-    if (!a->reached)
+    if (!a->reached && !r->status)
         printf("accuracy  not as asked: within %.2g until t=%.4g s only; after that runs by smaller steps "
                "part, and "
                "the motion is not predictable\n",
@@ -592,6 +592,9 @@ static drape_status begin_again(void *user, drape_sim *sim, const drape_accuracy
 {
     run *r = user;
     const drape_recorder_def def = recorder_def(r);
+    cli_signals_cancel(NULL);
+    if (cli_interrupted())
+        return DRAPE_E_STOPPED;
     cli_progress_clear(&r->progress);
     if (before->runs > 1 && r->progress.on)
         fprintf(stderr, "run %d: %s\n", (int)before->runs, before->method);
@@ -614,6 +617,8 @@ static drape_status run_accurately(run *r)
     def.threads = r->request->command.threads ? r->request->command.threads : 1;
     const drape_status status =
         drape_run_accurately(r->in.ctx, r->in.model, &def, begin_again, r, &last, &r->accuracy);
+    if (!last)
+        drape_recorder_destroy(&r->recorder);
     r->in.sim = last ? last : first;
     if (last)
         drape_sim_destroy(&first);

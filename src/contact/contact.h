@@ -67,19 +67,15 @@ drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_conta
  * 3). */
 void drape_contact_add_forces(drape_contact *contact, bool conservative, bool dissipative, double *g);
 
-/* Restitution of an impact that begins and ends within a step of size h, in which the forces above do not see
- * its speed (Newton's law of impact). Where the contacts were evaluated last, by the mean velocities of such
- * a step, has pairs that approached each other faster than the restitution velocity part by their coefficient
- * times the speed of the impact, whose square is that at the beginning of the step plus twice the
- * acceleration times the gap there. before, acceleration: of the nodes, at the beginning; v: to be changed
- * (node_count x 3). drape_contact_impacts: whether there are such pairs; drape_contact_rebounds: whether
- * anything has a coefficient above 0. */
-bool drape_contact_impacts(const drape_contact *contact, const double *before);
-bool drape_contact_rebounds(const drape_contact *contact);
-void drape_contact_rebound(const drape_contact *contact, double h, const double *before,
-                           const double *acceleration, double *v);
-/* Sets u (node_count x 3) to 0 at the nodes of these contacts. */
-void drape_contact_clear(const drape_contact *contact, double *u);
+/* Where the contacts were evaluated last, by the mean velocities of a step of size h: whether something was
+ * hit in it. before (node_count x 3): the velocities at its beginning. */
+bool drape_contact_impacts(const drape_contact *contact, double h, const double *before);
+
+/* Restitution of an impact that begins and ends within a step, in which the forces above do not see its speed
+ * (Newton's law of impact): pairs that crossed their activation distance in such a step part by their
+ * coefficient times the speed of the impact, whose square is that at the beginning of the step plus twice the
+ * acceleration of a fall times the gap there. v (node_count x 3): to be changed. */
+void drape_contact_rebound(const drape_contact *contact, double h, const double *before, double *v);
 
 /* The forces of the last drape_contact_add_forces on each collider (collider_count), with the sign of g. */
 const drape_load *drape_contact_on_colliders(const drape_contact *contact);

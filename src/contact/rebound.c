@@ -4,10 +4,10 @@
 #include "base/vec3.h"
 
 #include <math.h>
-#include <string.h>
 
 /* An impulse at one pair changes the speeds of others that have its nodes: sweeps over all of them. */
-#define SWEEPS 4
+#define SWEEPS    4
+#define FEW_STEPS 0.1
 
 /* sum c_i n . u_i over the cloth's nodes of a contact, u (node_count x 3). */
 static double rate_of_nodes(const drape_contact *c, const drape_active_contact *contact, const double *u)
@@ -58,53 +58,50 @@ static void push(const drape_contact *c, const drape_active_contact *contact, do
     }
 }
 
-bool drape_contact_impacts(const drape_contact *c, const double *before)
+/* Faster than what rests, and so fast that it crosses the distance of contact in fewer than ten steps. */
+static bool hits(const drape_contact *c, const drape_active_contact *contact, double h, double rate)
+{
+    return !(contact->exempt > 0) && -rate > c->model->contact.restitution_velocity &&
+           -rate * h > FEW_STEPS * contact->pair.distance;
+}
+
+bool drape_contact_impacts(const drape_contact *c, double h, const double *before)
 {
     double mean, own;
     bool any = false;
     for (int32_t i = 0; i < c->active.count && !any; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
-        any = !(contact->exempt > 0) &&
-              rate_before(c, contact, before, &mean, &own) < -c->model->contact.restitution_velocity;
+        any = hits(c, contact, h, rate_before(c, contact, before, &mean, &own));
     }
     return any;
 }
 
-bool drape_contact_rebounds(const drape_contact *c)
+/* The share of gravity in the acceleration of a gap: free nodes fall. */
+static double fall(const drape_contact *c, const drape_active_contact *contact)
 {
-    bool any = c->model->contact.self && c->model->contact.self_restitution > 0;
-    for (int32_t i = 0; i < c->model->collider_count; i++)
-        any = any || c->model->colliders[i].restitution > 0;
-    return any;
+    const drape_closest *closest = &contact->gap.closest;
+    double sum = 0;
+    for (int a = 0; a < closest->points; a++)
+        if (contact->pair.node[a] < c->model->node_count &&
+            c->model->free_of_node[contact->pair.node[a]] >= 0)
+            sum += closest->c[a];
+    return sum * vec3_dot(closest->normal, c->model->gravity);
 }
 
-void drape_contact_rebound(const drape_contact *c, double h, const double *before, const double *acceleration,
-                           double *v)
+void drape_contact_rebound(const drape_contact *c, double h, const double *before, double *v)
 {
-    const drape_contact_def *def = &c->model->contact;
     for (int sweep = 0; sweep < SWEEPS; sweep++)
         for (int32_t i = 0; i < c->active.count; i++) {
             const drape_active_contact *contact = &c->active.contacts[i];
             const double e = contact->pair.collider >= 0
                                  ? c->model->colliders[contact->pair.collider].restitution
-                                 : def->self_restitution;
-            if (!(e > 0) || contact->exempt > 0)
-                continue;
+                                 : c->model->contact.self_restitution;
             double mean, own;
             const double approach = rate_before(c, contact, before, &mean, &own),
                          gap = fmax(contact->gap.value - h * mean, 0),
-                         speed = sqrt(fmax(
-                             approach * approach - 2 * gap * rate_of_nodes(c, contact, acceleration), 0)),
+                         speed = sqrt(fmax(approach * approach - 2 * gap * fall(c, contact), 0)),
                          more = e * speed - own - rate_of_nodes(c, contact, v);
-            if (approach < 0 && speed > def->restitution_velocity && more > 0)
+            if (e > 0 && more > 0 && -approach * h > contact->pair.distance && hits(c, contact, h, approach))
                 push(c, contact, more, v);
         }
-}
-
-void drape_contact_clear(const drape_contact *c, double *u)
-{
-    for (int32_t i = 0; i < c->active.count; i++)
-        for (int a = 0; a < c->active.contacts[i].gap.closest.points; a++)
-            if (c->active.contacts[i].pair.node[a] < c->model->node_count)
-                memset(u + 3 * (size_t)c->active.contacts[i].pair.node[a], 0, 3 * sizeof *u);
 }

@@ -8,7 +8,7 @@
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
  * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling satisfy.
  * Hairer, Norsett & Wanner 1993, III.5. The first step, the first one after a discontinuity, and those of
- * impacts are backward Euler (be.c), whose state has the velocity of its time.
+ * impacts are backward Euler.
  *
  * The local error, by Milne's device: with c = (1 + r)^2/(6 r (1 + 2 r)) the formula is off by c h^3 x''',
  * and x0 + h v0 + h^2/2 (v0 - v_)/h_before by -(1/6 + 1/(4 r)) h^3 x''', because the difference of velocities
@@ -16,6 +16,7 @@
  */
 #include "integrators/implicit.h"
 
+#include <math.h>
 #include <string.h>
 
 /* The history that the formula needs: differences between a state and the one before it. */
@@ -127,7 +128,7 @@ static drape_status differentiate(bdf2_state *s, const drape_state *in, drape_st
     set_equation(s, in, a, w);
     expect(s, in, h, r);
     const drape_status status = drape_implicit_solve(&s->common, info);
-    *hits = drape_implicit_hits(&s->common, in, status);
+    *hits = drape_implicit_hits(&s->common, in, h, status);
     if (status || *hits)
         return status;
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
@@ -156,7 +157,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (!euler)
         return status;
     status = drape_implicit_euler(&s->common, in, out, h, info);
-    if (!status && !s->common.made.impact)
+    if (!status && isnan(s->common.made_end))
         record(s, in, out, h);
     return status;
 }
@@ -165,7 +166,7 @@ static void restart(void *state, const drape_state *from)
 {
     bdf2_state *s = state;
     s->past.known = s->made.known = false;
-    (void)from;
+    drape_implicit_restart(state, from);
 }
 
 static void archive_past(const bdf2_state *s, past *p, drape_archive *a)

@@ -2,17 +2,9 @@
  * be: backward Euler, first order and L-stable. It damps oscillations that it cannot resolve: each step
  * multiplies an oscillator's energy by 1/(1 + (w h)^2). As in Baraff & Witkin 1998, but solved to a tolerance
  * instead of by one linear solve.
- *     u1 = (x1 - x0)/h,  M (u1 - u0)/s + g(x1, u1) = 0,  q' = (q(x1) - q(x0))/h
- * The velocity u1 is the mean of the step, and so that of its middle. From the middle of a step of size h_ to
- * that of this one it is s = (h_ + h)/2, and from a state whose velocity is that of its time, h/2: there u0 =
- * v0. At constant steps this is x1 - 2 x0 + x_ = -h^2 M^-1 g(x1, u1), the recurrence of backward Euler with
- * its damping and stability; but with s = h and u0 = v0 in the first step, as it is usually written, a fall
- * is ahead of itself by g h t/2. Here it is exact. A state has the velocity of its time, v1 = u1 + h/2 (u1 -
- * u0)/s; of nodes in contact, whose acceleration may be that of an impact, u1. With terms that have momenta,
- * s = h, u0 = v0 and v1 = u1.
- *
- * With d = x1 - x0:  M (d - h u0)/(h s) + g(x0 + d, d/h) = 0. What solves are measured by is half of d - h
- * u0, h^2 a/2 (q and C of nonlinear/stopping.h).
+ *     v1 = (x1 - x0)/h,  M (v1 - v0)/h + g(x1, v1) = 0,  q' = (q(x1) - q(x0))/h
+ * With d = x1 - x0:  M (d - h v0)/h^2 + g(x0 + d, d/h) = 0. The local error is h^2 a/2, half of d - h v0:
+ * that is q and C of nonlinear/stopping.h.
  */
 #include "integrators/implicit.h"
 

@@ -68,6 +68,7 @@ static bool create_ida(drape_first_order *s)
 {
     s->newton.retreat = drape_first_order_retreat;
     s->newton.user = s;
+    s->limit = INFINITY;
     s->memory = IDACreate(s->sun);
     if (!s->memory || !configure(s))
         return false;

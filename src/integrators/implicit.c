@@ -9,12 +9,10 @@
 drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape_implicit *s)
 {
     const drape_model *m = drape_system_model(system);
-    *s = (drape_implicit){.motion = drape_system_motion(system), .past.t = NAN, .made.t = NAN};
+    *s = (drape_implicit){.motion = drape_system_motion(system), .hit_end = NAN, .made_end = NAN};
     drape_status status = drape_step_equation_init(arena, system, &s->equation);
     s->d = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->d);
     s->carried = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->carried);
-    s->past.offset = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->past.offset);
-    s->made.offset = drape_arena_take(arena, 3 * (size_t)m->free_count, sizeof *s->made.offset);
     if (m->has_laws)
         s->history = drape_arena_take(arena, (size_t)m->measure_count, sizeof *s->history);
     if (m->has_dissipation)
@@ -77,38 +75,20 @@ void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, dou
     drape_implicit_place(s, in, t, span, e->x_base, e->v_base);
 }
 
-/* The last attempt was accepted if `in` is the state that it computed. */
-static bool follows_euler(drape_implicit *s, const drape_state *in)
-{
-    if (s->made.t == in->t) {
-        const drape_euler_end swap = s->past;
-        s->past = s->made;
-        s->made = swap;
-    }
-    s->made.t = NAN;
-    return s->past.t == in->t;
-}
-
 void drape_implicit_begin_euler(drape_implicit *s, const drape_state *in, double t, double h)
 {
     drape_step_equation *e = &s->equation;
-    const bool follows = follows_euler(s, in);
-    /* of terms with momenta, which depend on the positions, only sums at the end of a step are conserved */
-    const double span = e->momentum ? h : h / 2 + (follows ? s->past.lag : 0);
     drape_implicit_base(s, in, t, h);
+    s->made_end = NAN;
     e->point.weight = 1 / h;
-    e->mass_weight = 1 / h * (1 / span);
+    e->mass_weight = 1 / h * (1 / h);
     e->expected = e->inertia;
     e->error_share = 0.5; /* the local error is h^2 a / 2, and d - h v0 is h^2 a */
-    memcpy(e->v, in->v, e->nodes * sizeof *e->v);
-    for (size_t i = 0; i < e->dofs; i++) {
-        double *u = &e->v[drape_step_equation_at(e, i)];
-        *u += follows ? s->past.offset[i] : 0;
-        e->inertia[i] = h * *u;
-    }
+    for (size_t i = 0; i < e->dofs; i++)
+        e->inertia[i] = h * in->v[drape_step_equation_at(e, i)];
     drape_implicit_carry(s, in, h, NULL, h);
-    drape_implicit_momentum(s, in->t, in->x, e->v, s->momentum[0]);
-    drape_implicit_set_momenta(s, 1 / span, 1, s->momentum[0], 0, NULL);
+    drape_implicit_momentum(s, in->t, in->x, in->v, s->momentum[0]);
+    drape_implicit_set_momenta(s, 1 / h, 1, s->momentum[0], 0, NULL);
     e->point.history = s->history;
     if (!s->history)
         return;
@@ -117,60 +97,34 @@ void drape_implicit_begin_euler(drape_implicit *s, const drape_state *in, double
         s->history[i] /= -h;
 }
 
-/* Whether something that touches where the equation was evaluated last approached it faster than anything
- * that rests on it. */
-static bool hits(const drape_step_equation *e, const drape_state *in)
+/* Whether something that touches where the equation was evaluated last was hit in a step of h. */
+static bool hits(const drape_step_equation *e, const drape_state *in, double h)
 {
     const drape_contact *contact = drape_system_contact(e->system);
-    return contact && drape_contact_impacts(contact, in->v);
-}
-
-/* Has cloth rebound in an impact, by its velocities u1 (nodes) after it; and leaves out h/2 a of what touches
- * something, whose force changes within a step. Overwrites v_base. */
-static void settle_contact(const drape_implicit *s, const drape_state *in, double h, double *ahead, double *u)
-{
-    const drape_step_equation *e = &s->equation;
-    const drape_contact *contact = drape_system_contact(e->system);
-    double *acceleration = e->v_base;
-    if (!contact)
-        return;
-    drape_contact_clear(contact, ahead);
-    if (!drape_contact_rebounds(contact))
-        return;
-    memset(acceleration, 0, e->nodes * sizeof *acceleration);
-    for (size_t i = 0; s->past.t == in->t && s->past.lag > 0 && i < e->dofs; i++)
-        acceleration[drape_step_equation_at(e, i)] = -s->past.offset[i] / s->past.lag;
-    drape_contact_rebound(contact, h, in->v, acceleration, u);
+    return contact && drape_contact_impacts(contact, h, in->v);
 }
 
 void drape_implicit_end_euler(drape_implicit *s, const drape_state *in, drape_state *out, double h,
                               drape_step_info *info)
 {
     const drape_step_equation *e = &s->equation;
-    double *ahead = e->probe; /* h/2 a = (u1 - u0) (h/2)/span, by the weight 1/(h span) of the masses */
     memcpy(out->x, e->x, e->nodes * sizeof *out->x);
     memcpy(out->v, e->v_base, e->nodes * sizeof *out->v);
-    for (size_t i = 0; i < e->dofs; i++) {
-        const size_t at = drape_step_equation_at(e, i);
-        out->v[at] = s->d[i] / h;
-        ahead[at] = e->momentum ? 0 : (s->d[i] - e->inertia[i]) * e->mass_weight * h / 2;
-    }
-    s->made.impact = hits(e, in);
-    settle_contact(s, in, h, ahead, out->v);
-    for (size_t i = 0; i < e->dofs; i++) {
-        const size_t at = drape_step_equation_at(e, i);
-        out->v[at] += ahead[at];
-        s->made.offset[i] = -ahead[at];
+    for (size_t i = 0; i < e->dofs; i++)
+        out->v[drape_step_equation_at(e, i)] = s->d[i] / h;
+    if (hits(e, in, h)) {
+        s->made_end = out->t;
+        drape_contact_rebound(drape_system_contact(e->system), h, in->v, out->v);
     }
     drape_ranks_fetch(e->ranks, out->v);
-    s->made.t = out->t;
-    s->made.lag = e->momentum ? 0 : h / 2;
     drape_implicit_audit(s, in, out, info);
 }
 
 drape_status drape_implicit_euler(drape_implicit *s, const drape_state *in, drape_state *out, double h,
                                   drape_step_info *info)
 {
+    info->error = info->left = NAN; /* of another equation that was solved before */
+    info->by_error = false;
     drape_implicit_begin_euler(s, in, out->t, h);
     s->equation.pins_ahead =
         drape_implicit_pins_ahead(s, in, h); /* trbdf2 and midpoint took longer with it */
@@ -182,12 +136,15 @@ drape_status drape_implicit_euler(drape_implicit *s, const drape_state *in, drap
 
 bool drape_implicit_follows_impact(drape_implicit *s, const drape_state *in)
 {
-    return follows_euler(s, in) && s->past.impact;
+    if (s->made_end == in->t) /* the last attempt was accepted */
+        s->hit_end = in->t;
+    s->made_end = NAN;
+    return s->hit_end == in->t;
 }
 
-bool drape_implicit_hits(const drape_implicit *s, const drape_state *in, drape_status status)
+bool drape_implicit_hits(const drape_implicit *s, const drape_state *in, double h, drape_status status)
 {
-    return status >= 0 && hits(&s->equation, in);
+    return status >= 0 && hits(&s->equation, in, h);
 }
 
 /* How far the moved pins among so many nodes, from `first` on, get ahead, in the mean. */
@@ -407,7 +364,7 @@ void drape_implicit_restart(void *state, const drape_state *from)
 {
     drape_implicit *s = state;
     (void)from;
-    s->past.t = s->made.t = NAN;
+    s->hit_end = s->made_end = NAN;
 }
 
 const double *drape_implicit_residual(const void *state)
@@ -420,21 +377,11 @@ double drape_implicit_tolerance(const void *state)
     return drape_newton_values(((const drape_implicit *)state)->newton)[DRAPE_NEWTON_TOLERANCE];
 }
 
-static void archive_end(const drape_implicit *s, drape_euler_end *end, drape_archive *a)
-{
-    drape_archive_double(a, &end->t);
-    if (isnan(end->t))
-        return;
-    drape_archive_double(a, &end->lag);
-    drape_archive_bool(a, &end->impact);
-    drape_archive_doubles(a, end->offset, s->equation.dofs);
-}
-
 void drape_implicit_archive(void *state, drape_archive *a)
 {
     drape_implicit *s = state;
-    archive_end(s, &s->past, a);
-    archive_end(s, &s->made, a);
+    drape_archive_double(a, &s->hit_end);
+    drape_archive_double(a, &s->made_end);
     drape_newton_archive(s->newton, a);
 }
 

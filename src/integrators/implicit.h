@@ -9,14 +9,6 @@
 #include "integrators/integrator.h"
 #include "nonlinear/newton.h"
 
-/* What a step of backward Euler leaves to the next one. Its velocity (x1 - x0)/h is that of the middle of the
- * step, `lag` before the end, and is the state's plus `offset`. */
-typedef struct drape_euler_end {
-    double t, lag;  /* [s]; t NAN: there is none */
-    double *offset; /* free DOFs */
-    bool impact;    /* something hit another thing in that step */
-} drape_euler_end;
-
 typedef struct drape_implicit {
     drape_step_equation equation;
     const drape_motion *motion;
@@ -26,7 +18,9 @@ typedef struct drape_implicit {
     double *history;      /* measures; NULL if no law needs rates */
     double *dissipated;   /* nodes; NULL if nothing dissipates */
     double *momentum[2];  /* nodes: at the beginning and at the end of a stage; NULL if no term has any */
-    drape_euler_end past, made; /* of the step to the present state; of the last attempt */
+    double hit_end,
+        made_end; /* [s] where the present state, and that of the last attempt, end a step in which something
+                                 was hit; NAN: they do not */
 } drape_implicit;
 
 /* For integrators that embed it: without a solver, or with Newton's. Errors: as for drape_newton_create. */
@@ -58,11 +52,10 @@ void drape_implicit_place(const drape_implicit *implicit, const drape_state *in,
  * until a history is set. */
 void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
 
-/* Sets the equation of backward Euler, of which be.c has the derivation: base, u1 = (x1 - x0)/h, q' = (q1 -
- * q0)/h. Afterwards the nodes' u0 are in equation.v, and the free ones' h u0 in equation.inertia. */
+/* Sets the equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. */
 void drape_implicit_begin_euler(drape_implicit *implicit, const drape_state *in, double t, double h);
 
-/* The state at the solution d of that equation, and the account of work. */
+/* The state at the solution d of that equation, with velocities after an impact, and the account of work. */
 void drape_implicit_end_euler(drape_implicit *implicit, const drape_state *in, drape_state *out, double h,
                               drape_step_info *info);
 
@@ -76,7 +69,8 @@ drape_status drape_implicit_euler(drape_implicit *implicit, const drape_state *i
  * one after it: */
 bool drape_implicit_follows_impact(drape_implicit *implicit, const drape_state *in);
 /* After such a method has solved its own equation with `status`: whether something was hit. */
-bool drape_implicit_hits(const drape_implicit *implicit, const drape_state *in, drape_status status);
+bool drape_implicit_hits(const drape_implicit *implicit, const drape_state *in, double h,
+                         drape_status status);
 
 /* Once the equation has its `expected`, sets what is carried: that, and for the nodes of each cloth the mean
  * displacement by which its moved pins get ahead of theirs, h v0 or, with dv (nodes), the change of velocity

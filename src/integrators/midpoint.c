@@ -26,7 +26,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     for (size_t i = 0; i < e->dofs; i++)
         e->inertia[i] = h / 2 * in->v[drape_step_equation_at(e, i)];
     drape_status status = drape_implicit_solve(s, info);
-    if (drape_implicit_hits(s, in, status))
+    if (drape_implicit_hits(s, in, h, status))
         return drape_implicit_euler(s, in, out, h, info);
     info->error *= 2; /* d is that to the middle of the step */
     if (status)

@@ -63,11 +63,11 @@ typedef struct newton_k {
 static void restart(void *state, const drape_state *from)
 {
     newton_k *s = state;
+    (void)from;
     for (int k = 0; k < PAST; k++)
         s->past_time[k] = NAN;
     s->past_end = NAN;
     s->touches = s->touched = false;
-    drape_implicit_restart(state, from);
 }
 
 static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
@@ -79,8 +79,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     if (isnan(s->values[PARAM_ERROR]))
         s->values[PARAM_ERROR] = ERROR_SHARE * drape_system_model(system)->length;
     s->deadline = INFINITY;
-    drape_status status = drape_implicit_init(arena, system, &s->common);
     restart(s, NULL);
+    drape_status status = drape_implicit_init(arena, system, &s->common);
     for (int k = 0; k < PAST; k++)
         s->past[k] = drape_arena_take(arena, s->common.equation.nodes, sizeof *s->past[k]);
     double newton[DRAPE_NEWTON_PARAM_COUNT];
@@ -93,7 +93,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
 }
 
 /* How alike the last two changes of velocity are, 0 to 1; 1 where only one is known. */
-static double correlation(const newton_k *s)
+static double correlation(const newton_k *s, const drape_state *in)
 {
     const drape_step_equation *e = &s->common.equation;
     double last = 0, before = 0, both = 0;
@@ -101,7 +101,7 @@ static double correlation(const newton_k *s)
         return 1;
     for (size_t i = 0; i < e->dofs; i++) {
         const size_t at = drape_step_equation_at(e, i);
-        const double a = s->past[0][at] - s->past[1][at], b = s->past[1][at] - s->past[2][at],
+        const double a = in->v[at] - s->past[1][at], b = s->past[1][at] - s->past[2][at],
                      m = e->model->mass[at / 3];
         last += m * a * a;
         before += m * b * b;
@@ -117,12 +117,12 @@ static void guess(newton_k *s, const drape_state *in, double h)
     if (before < (1 - DRAPE_SAME) * h)
         before = h;
     if (!isnan(before) && !s->touched)
-        share = fmin(MOST_EXTRAPOLATED, correlation(s)) * h * h / before;
+        share = fmin(MOST_EXTRAPOLATED, correlation(s, in)) * h * h / before;
     for (size_t i = 0; i < e->dofs; i++) {
         size_t at = drape_step_equation_at(e, i);
         s->common.d[i] = e->inertia[i];
         if (share > 0)
-            s->common.d[i] += share * (s->past[0][at] - s->past[1][at]);
+            s->common.d[i] += share * (in->v[at] - s->past[1][at]);
     }
 }
 
@@ -155,7 +155,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         s->touched = follows && s->touches;
         s->past[0] = oldest;
         s->past_time[0] = in->t;
-        memcpy(s->past[0], e->v, e->nodes * sizeof *e->v);
+        memcpy(s->past[0], in->v, e->nodes * sizeof *in->v);
     }
     guess(s, in, h);
     const int least = s->cheap ? 1 : (int)s->values[PARAM_ITERATIONS];
@@ -197,7 +197,7 @@ static void archive(void *state, drape_archive *a)
     }
     drape_archive_bool(a, &s->touches);
     drape_archive_bool(a, &s->touched);
-    drape_implicit_archive(state, a);
+    drape_newton_archive(s->common.newton, a);
 }
 
 static double error_bound(const void *state)

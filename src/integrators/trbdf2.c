@@ -47,7 +47,7 @@ static drape_status solve_stage(trbdf2_state *s, const drape_state *in, double w
     e->point.weight = w;
     e->mass_weight = w * w;
     const drape_status status = drape_implicit_solve_from(&s->common, info);
-    s->hits = drape_implicit_hits(&s->common, in, status);
+    s->hits = drape_implicit_hits(&s->common, in, 2 / (GAMMA * w), status);
     if (status)
         return status;
     memcpy(x, e->x, e->nodes * sizeof *x);

@@ -207,7 +207,7 @@ drape_status drape_json_check(drape_context *ctx, const drape_pointer *at, const
 static drape_status read_one(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
     drape_setting setting;
-    double values[DRAPE_PARAM_WIDEST];
+    double values[DRAPE_PARAM_WIDEST] = {0};
     if (key->or_number && json_is_number(value)) {
         char text[32];
         snprintf(text, sizeof text, "%.17g", json_number_value(value));

@@ -134,8 +134,8 @@ void drape_sim_exchange(drape_sim *sim, drape_sim *other);
 drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,
                               const double *masses);
 
-/* Goes on by the method, the controller and the settings of a def, from the present state. Frames that the last
- * step has passed must have been emitted. Errors: those of drape_sim_create; then the sim is unchanged. */
+/* Goes on by the method, the controller and the settings of a def, from the present state. Frames within the
+ * last step must have been emitted. Errors: those of drape_sim_create; then the sim is unchanged. */
 drape_status drape_sim_continue_by(drape_sim *sim, const drape_sim_def *def);
 
 /* Pins these nodes (node_count) and no others: nodes that become free go on with the velocity of their

@@ -12,7 +12,7 @@ def test_results():
     write_scene()
     good("run", "scene.json", "--out", "fine", "--integrator", "radau", "--set", "/integrator/rtol=1e-7", "--format", "npy")
     for text in ("2mm", "4e-3"):  # of a diagonal of 0.5 m
-        printed = good("run", "scene.json", "--accuracy", text, "--out", "run", "--format", "npy").stdout
+        printed = good("run", "scene.json", "--accuracy", text, "--out", "run", "--format", "npy")
         summary = read_json("run/summary.json")
         of = summary["accuracy_of"]
         assert 0 < summary["accuracy"] <= 4e-3 and of["reached"] and of["until"] == 0.25 and of["runs"] > 1, summary

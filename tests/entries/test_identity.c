@@ -47,6 +47,7 @@ static const struct test_case {
     /* They concern people, or what a run writes and how long it lasts. */
     {"/description", RESUMES, NULL, "'a remark'"},
     {"/duration", RESUMES, NULL, "2"},
+    {"/accuracy", RESUMES, NULL, "'1 um'"}, /* for one sim only a distance of contact, not larger here */
     {"/output/formats", RESUMES, NULL, "['obj']"},
     {"/output/up", RESUMES, NULL, "'z'"},
     {"/cloth/0/name", RESUMES, NULL, "'another'"},

@@ -120,7 +120,7 @@ TEST(what_cannot_be_run_so_is_refused)
 {
     static const struct {
         const char *more, *says;
-    } rows[] = {{"'duration': 0.4", "asks for no accuracy"},
+    } rows[] = {{"'frame_rate': 60", "asks for no accuracy"},
                 {"'accuracy': 1e-9", "below what double precision gives"},
                 {"'accuracy': '1e-4 um'", "below what double precision gives"},
                 {"'accuracy': '1mm', 'integrator': {'method': 'verlet'}", "does not converge"},
