@@ -115,10 +115,11 @@ TEST(rest_is_the_same)
     assert_below(fabs(height[0] - height[1]), 1e-9 * DISTANCE);
 }
 
-/* Steps of 1/30 to 1/480 s, in which a fall of 0.6 m crosses the activation distance of a millimetre 110 to 7
- * times over: with coefficient 0 nothing rebounds, but for 2 % that a step of gravity makes of the fall's
- * energy, and with 0.5 it does to a quarter of the height. The speed of the impact is known to a step's gravity, g
- * dt/v = 0.1 at 1/30 s, and the energy, in three such steps around it, to thrice as much. */
+/* Steps of 1/30 to 1/480 s, in which a fall of 0.6 m crosses the activation distance of a millimetre 110
+ * to 7 times over: with coefficient 0 nothing rebounds, but for 2 % that a step of gravity makes of the
+ * fall's energy, and with 0.5 it does to a quarter of the height. The speed of the impact is known to a
+ * step's gravity, g dt/v = 0.1 at 1/30 s, and the energy, in three such steps around it, to thrice as
+ * much. */
 TEST(impacts_within_a_step_rebound_by_their_coefficient)
 {
     static const char *const fixed[] = {"be", "newton_k", "bdf2", "trbdf2", "midpoint"};
