@@ -710,7 +710,17 @@ static int check_accuracy(run *r)
     if (r->request->realtime || keeps_checkpoints(r))
         return cli_misuse(command->verb,
                           "--%s: a scene with an accuracy is run several times, from its start", option);
-    return drape_accuracy_check(r->in.ctx, r->in.model) ? cli_report(command, CLI_BAD_INPUT) : CLI_GO_ON;
+    if (drape_accuracy_check(r->in.ctx, r->in.model))
+        return cli_report(command, CLI_BAD_INPUT);
+    for (size_t i = 0; i < command->setting_count; i++) {
+        const cli_setting *s = &command->settings[i];
+        if (strcmp(s->pointer, "/integrator/method") == 0 || strcmp(s->pointer, "/integrator/dt") == 0 ||
+            strncmp(s->pointer, "/controller", strlen("/controller")) == 0)
+            return cli_misuse(command->verb,
+                              "--%s \"%.60s\": an accuracy chooses the method and its steps; leave it out",
+                              s->option, s->value);
+    }
+    return CLI_GO_ON;
 }
 
 static int load_and_run(const run_request *request)

@@ -33,6 +33,8 @@ def test_refusals():
         refused("run", "scene.json", "--accuracy", text, says="/accuracy")
     refused("run", "scene.json", "--accuracy", "1e-12", says="below what double precision gives")
     refused("run", "scene.json", "--accuracy", "1mm", "--integrator", "verlet", says="\"verlet\" does not converge")
+    for option in (("--dt", "1e-3"), ("--integrator", "be"), ("--set", "/controller/type=fixed")):
+        refused("run", "scene.json", "--accuracy", "1mm", *option, says="leave it out")
     for option in (("--realtime",), ("--out", "run", "--resume"), ("--out", "run", "--checkpoint-every", "2")):
         refused("run", "scene.json", "--accuracy", "1mm", *option, says="is run several times")
 
