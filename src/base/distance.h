@@ -9,6 +9,12 @@ typedef struct drape_distance {
     bool is_share; /* it has no unit, or % */
 } drape_distance;
 
+/* [m] of something of this size [m]. */
+static inline double drape_distance_of(const drape_distance *distance, double size)
+{
+    return distance->value * (distance->is_share ? size : 1);
+}
+
 /* What is read, for messages. */
 #define DRAPE_DISTANCE_FORM                                                                                  \
     "a length above 0 in m, cm, mm or um, such as 1mm, or a share of a cloth's diagonal, above 0 and below " \

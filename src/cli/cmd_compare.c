@@ -310,7 +310,7 @@ static int judge(const compare *c)
     }
     for (int32_t i = 0; i < d->model[0]->cloth_count; i++) {
         const drape_apart *largest = &d->cloths[i].largest;
-        const double bound = c->within.value * (c->within.is_share ? d->cloths[i].diagonal : 1);
+        const double bound = drape_distance_of(&c->within, d->cloths[i].diagonal);
         if (largest->rms <= bound)
             continue;
         cli_misuse("compare", "--within %s: %s is %s apart (RMS) at t=%.6g s, more than %s",

@@ -162,23 +162,6 @@ static double scene_speed(const drape_model *model)
 
 #define ACCURACY_SHARE 0.1 /* of the accuracy that is asked, which contact may take */
 
-/* Of the boxes of the cloths at rest. */
-static double smallest_diagonal(const drape_model *model)
-{
-    double smallest = INFINITY;
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const double *rest = model->rest + 3 * (size_t)model->cloths[c].first_node;
-        double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, sides[3];
-        for (size_t i = 0; i < 3 * (size_t)model->cloths[c].mesh.node_count; i++) {
-            low[i % 3] = fmin(low[i % 3], rest[i]);
-            high[i % 3] = fmax(high[i % 3], rest[i]);
-        }
-        vec3_sub(high, low, sides);
-        smallest = fmin(smallest, vec3_norm(sides));
-    }
-    return smallest;
-}
-
 /* |g|; without gravity, L / s^2 */
 static double fall_acceleration(const drape_model *model)
 {
@@ -258,8 +241,8 @@ drape_status drape_compile_contact(drape_model *model, const drape_scene_def *de
         contact->distance = fmax(contact->distance, model->cloths[c].material.thickness);
     if (isnan(distance) && model->accuracy.value > 0) /* nobody asks where cloth is within less */
         contact->distance =
-            fmax(contact->distance, ACCURACY_SHARE * model->accuracy.value *
-                                        (model->accuracy.is_share ? smallest_diagonal(model) : 1));
+            fmax(contact->distance,
+                 ACCURACY_SHARE * drape_distance_of(&model->accuracy, drape_model_least_diagonal(model)));
     contact->stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->stiffness_given = !isnan(contact->stiffness);
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];

@@ -104,6 +104,19 @@ static void copy_numbers(int32_t *to, const int32_t *from, size_t count, int32_t
         to[i] = from[i] + first;
 }
 
+/* Of the box around points (count x 3). */
+static double diagonal_of(const double *x, size_t count)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * count; i++) {
+        low[i % 3] = fmin(low[i % 3], x[i]);
+        high[i % 3] = fmax(high[i % 3], x[i]);
+    }
+    for (int k = 0; k < 3; k++)
+        high[k] -= low[k];
+    return sqrt(high[0] * high[0] + high[1] * high[1] + high[2] * high[2]);
+}
+
 /* Concatenates the arrays of all cloths. */
 static drape_status gather(drape_model *model)
 {
@@ -132,14 +145,10 @@ static drape_status gather(drape_model *model)
                (size_t)mesh->edge_count * sizeof *mesh->edge_length);
         first_edge += (size_t)mesh->edge_count;
     }
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < 3 * (size_t)model->node_count; i++) {
-        low[i % 3] = fmin(low[i % 3], model->rest[i]);
-        high[i % 3] = fmax(high[i % 3], model->rest[i]);
-    }
-    for (int k = 0; k < 3; k++)
-        high[k] -= low[k];
-    model->length = sqrt(high[0] * high[0] + high[1] * high[1] + high[2] * high[2]);
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        model->cloths[c].diagonal = diagonal_of(model->rest + 3 * (size_t)model->cloths[c].first_node,
+                                                (size_t)model->cloths[c].mesh.node_count);
+    model->length = diagonal_of(model->rest, nodes);
     return DRAPE_OK;
 }
 

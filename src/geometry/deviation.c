@@ -62,13 +62,12 @@ static drape_status prepare_cloth(drape_deviation *d, int32_t c, drape_context *
     const drape_cloth *cloth = &m->cloths[c], *in = &other->cloths[c];
     const drape_box box = rest_box(m, cloth), box_in = rest_box(other, in);
     const bool same = same_triangles(cloth, in);
-    double sides[3], edge = 0, gap = 0; /* the mean edge; how far the meshes are apart at rest [m] */
+    double edge = 0, gap = 0; /* the mean edge; how far the meshes are apart at rest [m] */
     if (strcmp(cloth->name, in->name) != 0)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "cloth %d is \"%.60s\" in the first and \"%.60s\" in the second", (int)c,
                           d->model[0]->cloths[c].name, d->model[1]->cloths[c].name);
-    vec3_sub(box.high, box.low, sides);
-    d->cloths[c].diagonal = vec3_norm(sides);
+    d->cloths[c].diagonal = cloth->diagonal;
     for (int32_t e = 0; e < cloth->mesh.edge_count; e++)
         edge += cloth->mesh.edge_length[e] / cloth->mesh.edge_count;
     for (int k = 0; k < 3; k++) /* the other may reach further than any node of this one */
@@ -108,6 +107,13 @@ drape_status drape_deviation_create(drape_arena *arena, const drape_model *first
     for (int32_t c = 0; c < first->cloth_count && !status; c++)
         status = prepare_cloth(d, c, arena->ctx);
     return status;
+}
+
+void drape_deviation_restart(drape_deviation *d)
+{
+    d->frames = 0;
+    for (int32_t c = 0; c < d->model[0]->cloth_count; c++)
+        d->cloths[c].largest = (drape_apart){.node = d->model[d->of]->cloths[c].first_node};
 }
 
 void drape_deviation_measure(drape_deviation *d, double t, const double *x, const double *y)

@@ -47,6 +47,9 @@ typedef struct drape_deviation {
 drape_status drape_deviation_create(drape_arena *arena, const drape_model *first, const drape_model *second,
                                     drape_deviation *out);
 
+/* Forgets the frames that were added. */
+void drape_deviation_restart(drape_deviation *deviation);
+
 /* Measures a frame of both motions at the time t, positions x and y of the nodes of the first and of the
  * second model (finite): sets `now` of the cloths, and the distances. */
 void drape_deviation_measure(drape_deviation *deviation, double t, const double *x, const double *y);

@@ -95,7 +95,7 @@ static void expect(bdf2_state *s, const drape_state *in, double h, double r)
     drape_implicit_carry(&s->common, in, h, s->past.dv, s->past.h);
 }
 
-/* What the next step needs if this one is accepted. */
+/* What the next step needs if this one is accepted; q0 is known. */
 static void record(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
 {
     const drape_implicit *c = &s->common;
@@ -111,7 +111,6 @@ static void record(bdf2_state *s, const drape_state *in, const drape_state *out,
         s->made.dp[i] = c->momentum[1][i] - c->momentum[0][i];
     if (!c->history)
         return;
-    drape_implicit_measure(c, in->t, in->x, s->q0);
     drape_implicit_measure(c, out->t, out->x, s->made.dq);
     for (int64_t i = 0; i < c->equation.model->measure_count; i++)
         s->made.dq[i] -= s->q0[i];
@@ -157,8 +156,10 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (!euler)
         return status;
     status = drape_implicit_euler(&s->common, in, out, h, info);
-    if (!status && isnan(s->common.made_end))
+    if (!status && isnan(s->common.made_end)) {
+        drape_implicit_measure(&s->common, in->t, in->x, s->q0);
         record(s, in, out, h);
+    }
     return status;
 }
 

@@ -208,6 +208,7 @@ typedef struct drape_cloth {
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending;           /* of a measured fabric; warp 0: not a measured fabric */
+    double diagonal;                        /* [m] of the box at rest */
     double retardation;                     /* [s] of a measured fabric's loss; 0: none acts */
     drape_points curves[DRAPE_CURVE_COUNT]; /* measured: see drape_cloth_view */
     double *material_mass;                  /* (mesh.node_count) [kg] of the material alone */
@@ -458,6 +459,15 @@ struct drape_model {
     int32_t seam_count;
     int32_t *sewn; /* (node_count) the first of the nodes that a node is sewn to, or itself; NULL: no seams */
 };
+
+/* [m] the smallest diagonal of a cloth's box at rest. */
+static inline double drape_model_least_diagonal(const drape_model *model)
+{
+    double least = model->cloths[0].diagonal;
+    for (int32_t c = 1; c < model->cloth_count; c++)
+        least = model->cloths[c].diagonal < least ? model->cloths[c].diagonal : least;
+    return least;
+}
 
 static inline const drape_ranks *drape_model_ranks(const drape_model *model)
 {

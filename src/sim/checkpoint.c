@@ -248,8 +248,9 @@ static drape_status create_restored(drape_sim *sim, drape_archive *a, drape_sim 
     double *masses = read_own(sim, a, weighed, sizeof *masses);
     check_own(a, (size_t)sim->model->node_count, pinned, masses);
     const drape_status status =
-        drape_archive_good(a) ? drape_sim_create_like(sim, drape_sim_base_model(sim), pinned, masses, out)
-                              : a->status;
+        drape_archive_good(a)
+            ? drape_sim_create_like(sim, &sim->chosen, drape_sim_base_model(sim), pinned, masses, out)
+            : a->status;
     drape_free(sim->ctx, masses);
     drape_free(sim->ctx, pinned);
     return status;

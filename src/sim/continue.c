@@ -188,37 +188,37 @@ void drape_sim_forget_past(drape_sim *sim)
     drape_events_reset(sim);
 }
 
+/* Puts `other`, a new sim, in the place of the present one, whose state it gets; destroys it in any case. */
+static drape_status take_over(drape_sim *sim, drape_status created, drape_sim **other)
+{
+    const drape_status status = created ? created : go_on(*other, sim);
+    if (!status)
+        drape_sim_exchange(sim, *other);
+    drape_sim_destroy(other);
+    return status;
+}
+
 drape_status drape_sim_remake(drape_sim *sim, const drape_model *model, const uint8_t *pinned,
                               const double *masses)
 {
     drape_sim *other = NULL;
-    drape_status status = drape_sim_create_like(sim, model, pinned, masses, &other);
-    if (!status)
-        status = go_on(other, sim);
-    if (!status)
-        drape_sim_exchange(sim, other);
-    drape_sim_destroy(&other);
-    return status;
+    const drape_status status = drape_sim_create_like(sim, &sim->chosen, model, pinned, masses, &other);
+    return take_over(sim, status, &other);
 }
 
 drape_status drape_sim_continue_by(drape_sim *sim, const drape_sim_def *def)
 {
-    const drape_chosen present = sim->chosen;
-    drape_chosen next;
+    drape_chosen chosen;
+    drape_schedule fresh = sim->schedule;
     drape_sim *other = NULL;
-    drape_status status = drape_choose(sim->ctx, sim->model, def, &next);
-    if (status)
-        return status;
-    sim->chosen = next;
-    status = drape_sim_create_like(sim, sim->model, NULL, NULL, &other);
-    sim->chosen = present;
-    const drape_schedule fresh = other ? other->schedule : sim->schedule;
+    drape_status status = drape_choose(sim->ctx, sim->model, def, &chosen);
     if (!status)
-        status = go_on(other, sim);
-    if (!status) {
-        drape_schedule_init(&other->schedule, fresh.stepping, fresh.dt, drape_sim_time(sim));
-        drape_sim_exchange(sim, other);
-    }
-    drape_sim_destroy(&other);
+        status =
+            drape_sim_create_like(sim, &chosen, drape_sim_base_model(sim), sim->pinned, sim->masses, &other);
+    if (!status)
+        fresh = other->schedule;
+    status = take_over(sim, status, &other);
+    if (!status) /* that which came with the state is of the method before */
+        drape_schedule_init(&sim->schedule, fresh.stepping, fresh.dt, drape_sim_time(sim));
     return status;
 }

@@ -184,8 +184,9 @@ static drape_status change_nodes(drape_sim *sim, const uint8_t *pinned, const do
     return drape_arena_status(sim->arena);
 }
 
-drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
-                                   const double *masses, drape_sim **out)
+drape_status drape_sim_create_like(const drape_sim *like, const drape_chosen *chosen,
+                                   const drape_model *model, const uint8_t *pinned, const double *masses,
+                                   drape_sim **out)
 {
     const drape_sim_def def = {.frame_rate = like->frame_rate,
                                .realtime_step = like->realtime_step,
@@ -195,7 +196,7 @@ drape_status drape_sim_create_like(const drape_sim *like, const drape_model *mod
         status = change_nodes(*out, pinned, masses);
     status = drape_ranks_agree(drape_model_ranks(model), like->ctx, status);
     if (!status) {
-        (*out)->chosen = like->chosen;
+        (*out)->chosen = *chosen;
         status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
         if (!status)
             status = drape_events_copy(*out, like);

@@ -116,11 +116,12 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function);
 drape_status drape_sim_check_nodes(const drape_sim *sim, const char *function, int32_t count,
                                    const int32_t *nodes);
 
-/* Creates a new sim of a compiled model with the same choices, at the beginning and without an energy
- * account, which the caller copies or reads. pinned (node_count): the nodes that are pinned; masses
- * (node_count) [kg]; NULL: those of the model. */
-drape_status drape_sim_create_like(const drape_sim *like, const drape_model *model, const uint8_t *pinned,
-                                   const double *masses, drape_sim **out);
+/* Creates a new sim of a compiled model with these choices, and otherwise those of `like`, at the beginning
+ * and without an energy account, which the caller copies or reads. pinned (node_count): the nodes that are
+ * pinned; masses (node_count) [kg]; NULL: those of the model. */
+drape_status drape_sim_create_like(const drape_sim *like, const drape_chosen *chosen,
+                                   const drape_model *model, const uint8_t *pinned, const double *masses,
+                                   drape_sim **out);
 
 /* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
  * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
