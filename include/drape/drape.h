@@ -1421,7 +1421,7 @@ DRAPE_API drape_status drape_sim_observe(drape_sim *sim, drape_observer *observe
  * largest of all frames. */
 typedef struct drape_accuracy {
     double asked;    /* [1] share of the smallest diagonal of the cloths' boxes at rest */
-    double error;    /* [1] estimated share of the diagonal of the cloth that is furthest off; NaN: unknown */
+    double error;    /* [1] of the whole run by estimate, share of the diagonal of its cloth; NaN: unknown */
     double distance; /* [m] the same */
     double worst;    /* [m] of its node that is furthest off, likewise */
     int32_t cloth, node; /* of which these are; numbered in the cloth */

@@ -45,20 +45,14 @@ static double work_of(const drape_sim *sim)
 
 /* ---- Comparison ---- */
 
-/* Of a cloth [m]. */
-static double bound_of(const accurate *a, int32_t cloth)
-{
-    const drape_distance *asked = &a->model->accuracy;
-    return asked->is_share ? asked->value * a->apart.cloths[cloth].diagonal : asked->value;
-}
-
 /* How far the runs are apart at most, in units of what is asked of each cloth, times `accuracy` of the
  * refinement. */
 static double largest(const accurate *a)
 {
     double most = 0;
     for (int32_t c = 0; c < a->model->cloth_count; c++)
-        most = fmax(most, a->apart.cloths[c].largest.rms / bound_of(a, c));
+        most = fmax(most, a->apart.cloths[c].largest.rms /
+                              drape_distance_of(&a->model->accuracy, a->model->cloths[c].diagonal));
     return a->refinement.accuracy * most;
 }
 
@@ -141,9 +135,7 @@ static drape_status begin_trial(accurate *a, const drape_sim_def *given)
     a->report->runs++;
     snprintf(a->report->method, sizeof a->report->method, "%s, %s %.3g", level->method, level->key,
              level->value);
-    a->apart.frames = 0;
-    for (int32_t c = 0; c < a->model->cloth_count; c++)
-        a->apart.cloths[c].largest = (drape_apart){.node = a->model->cloths[c].first_node};
+    drape_deviation_restart(&a->apart);
     if (!status)
         status = a->prepare ? a->prepare(a->user, t->sim, a->report) : DRAPE_OK;
     if (t->sim)
@@ -196,6 +188,7 @@ static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
     drape_status status = DRAPE_OK;
     t->compares = t->rests = false;
     a->refinement.level.most = INFINITY;
+    a->report->error = a->report->distance = a->report->worst = NAN; /* of the whole run */
     if (a->refinement.level.controlled) {
         const size_t used = strlen(a->report->method);
         const drape_sim_def def = def_of(given, fixed, &setting);
@@ -250,10 +243,10 @@ static drape_status refine(accurate *a, const drape_sim_def *given)
                                                    : fmin(fmax(time / a->end, ROUNDING), 1 - ROUNDING),
                                            .work = work_of(t->sim),
                                            .failed = failure != DRAPE_OK,
-                                           .given_up = t->given_up || failure};
+                                           .given_up = t->given_up};
         more = drape_refinement_next(&a->refinement, &result);
         status = more ? DRAPE_OK : failure;
-        if (more && result.given_up) {
+        if (more && (failure || t->given_up)) {
             a->dropped = *t;
             t->sim = NULL;
             t->x = NULL;
@@ -272,10 +265,9 @@ static drape_status refine(accurate *a, const drape_sim_def *given)
 drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
 {
     const drape_distance *asked = &m->accuracy;
-    const drape_integrator_ops *named = NULL;
-    for (int i = 0; m->integrator_named && drape_integrators[i]; i++)
-        if (strcmp(drape_integrators[i]->entry.name, m->integrator.type) == 0)
-            named = drape_integrators[i];
+    const int number =
+        m->integrator_named ? drape_registry_find(&drape_integrator_registry, ctx, m->integrator.type) : -1;
+    const drape_integrator_ops *named = number >= 0 ? drape_integrators[number] : NULL;
     if (!(asked->value > 0))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "the scene asks for no accuracy");
     if (asked->value / (asked->is_share ? 1 : m->length) < LEAST)
@@ -324,11 +316,8 @@ drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, 
     a.times = drape_arena_take(&a.arena, (size_t)a.most + 1, sizeof *a.times);
     status = status ? status : drape_arena_status(&a.arena);
     if (!status) {
-        double size = INFINITY;
-        for (int32_t c = 0; c < model->cloth_count; c++)
-            size = fmin(size, a.apart.cloths[c].diagonal);
-        drape_refinement_init(&a.refinement, model, size,
-                              model->accuracy.value / (model->accuracy.is_share ? 1 : size));
+        const double size = drape_model_least_diagonal(model);
+        drape_refinement_init(&a.refinement, model, size, drape_distance_of(&model->accuracy, size) / size);
         report->asked = a.refinement.accuracy;
         status = refine(&a, def ? def : &own);
     }

@@ -90,7 +90,7 @@ static bool halve(drape_refinement *l)
 
 static bool next_controlled(drape_refinement *l, const drape_level_result *r)
 {
-    if (r->given_up) {
+    if (r->given_up || r->failed) {
         l->spent = r->work;
         l->before = NAN;
         return halve(l);
@@ -106,22 +106,20 @@ static bool whole_pair(const drape_refinement *l, const drape_level_result *r)
     return !isnan(l->before) && l->parted >= 1 && r->fraction >= 1;
 }
 
-/* Whether the present level agrees better with the one before than that did with its own: it is nearer, or,
- * of runs that were cut where they parted, for longer. */
+/* Whether the present level agrees better with the one before than that did with its own: it is nearer, also
+ * where both were cut because they parted, as in an impact; or it agrees for longer. */
 static bool converges(const drape_refinement *l, const drape_level_result *r)
 {
-    if (isnan(r->apart) || isnan(l->before) || (l->parted < 1 && r->fraction >= 1))
+    if (isnan(r->apart) || isnan(l->before) || l->before > SAME * r->apart)
         return true;
-    if (r->fraction < 1)
-        return l->parted < 1 && r->fraction > LONGER * l->parted;
-    return l->before > SAME * r->apart;
+    return l->parted < 1 && (r->fraction >= 1 || r->fraction > LONGER * l->parted);
 }
 
 bool drape_refinement_next(drape_refinement *l, const drape_level_result *r)
 {
     const bool other = l->level.controlled && l->level.share == 1; /* than the one before */
     const double error = drape_refinement_error(l, r->apart, r->fraction >= 1);
-    if (!r->given_up && r->fraction >= 1 && error <= l->accuracy)
+    if (r->fraction >= 1 && error <= l->accuracy)
         return false;
     l->failures = !r->failed ? 0 : l->failures > 0 && r->fraction > LONGER * l->failed ? 1 : l->failures + 1;
     l->failed = r->fraction;

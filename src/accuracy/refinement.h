@@ -28,7 +28,7 @@ typedef struct drape_level_result {
     double fraction; /* of the run that was made */
     double work;   /* evaluations of the residual, and of the matrix with its factors, which count as four */
     bool failed;   /* a step could not be made */
-    bool given_up; /* it has done its work, or has failed */
+    bool given_up; /* it has done its work */
 } drape_level_result;
 
 typedef struct drape_refinement {

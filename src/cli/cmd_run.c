@@ -359,35 +359,37 @@ static void write_summary(run *r, drape_folder *folder, const char *path)
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
 }
 
-/* Makes the recorder and the copy of the scene, unless the run is resumed, which has them already. The old
- * summary is removed, since a killed run must not leave it. A folder in which a file of somebody else would
- * be replaced is refused as bad input, before anything is changed; a folder that cannot be written is a
- * failure of the run. */
+/* Makes the recorder of the present sim, and the copy of the scene. */
+static drape_status make_output(run *r)
+{
+    const char *scene = r->request->command.operand;
+    const drape_recorder_def def = recorder_def(r);
+    const drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
+    if (status || !drape_recorder_done(r->recorder).writes || drape_scene_copy_is(scene, r->request->out))
+        return status;
+    return drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), scene,
+                            drape_recorder_folder(r->recorder));
+}
+
+/* Makes the output, unless the run is resumed, which has it already. The old summary is removed, since a
+ * killed run must not leave it. A folder in which a file of somebody else would be replaced is refused as bad
+ * input, before anything is changed; a folder that cannot be written is a failure of the run. */
 static int open_output(run *r)
 {
-    const cli_command *command = &r->request->command;
-    const bool resumed = r->recorder != NULL;
     drape_status status = DRAPE_OK;
     if (!r->request->out || drape_recorder_done(r->recorder).finished)
         return CLI_GO_ON;
-    const bool copies = !resumed && !drape_scene_copy_is(command->operand, r->request->out);
-    const drape_recorder_def def = recorder_def(r);
-    if (!resumed)
-        status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (!status && !drape_recorder_done(r->recorder).writes)
-        return CLI_GO_ON;
-    drape_folder *folder = status ? NULL : drape_recorder_folder(r->recorder);
-    if (resumed)
-        status = drape_folder_remove(folder, drape_folder_is_named, DRAPE_SUMMARY_NAME);
-    else if (!status && copies)
-        status = drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model), command->operand,
-                                  folder);
+    if (!r->recorder)
+        status = make_output(r);
+    else if (drape_recorder_done(r->recorder).writes)
+        status = drape_folder_remove(drape_recorder_folder(r->recorder), drape_folder_is_named,
+                                     DRAPE_SUMMARY_NAME);
     if (!status)
         return CLI_GO_ON;
     note(r, status);
     if (status != DRAPE_E_ARGUMENT && r->request->summary)
         write_summary(r, NULL, r->request->summary);
-    cli_print_message(command, r->message);
+    cli_print_message(&r->request->command, r->message);
     return status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED;
 }
 
@@ -483,19 +485,17 @@ static void print_accuracy(const run *r)
 {
     const drape_accuracy *a = &r->accuracy;
     printf("accuracy  %s, the last of %d runs: ", a->method, (int)a->runs);
-    if (isnan(a->error)) {
+    if (isnan(a->error))
         puts("its error is not known");
-        return;
-    }
-    printf(
-        "%.2g of the diagonal (%.3g m) from the motion, RMS over the nodes of %s, by estimate; node %d up to "
-        "%.3g m at t=%.4g s near (%.4g, %.4g, %.4g)\n",
-        a->error, a->distance, CLI_SHOWN(r->in.model->cloths[a->cloth].name), (int)a->node, a->worst, a->time,
-        a->place[0], a->place[1], a->place[2]);
+    else
+        printf("%.2g of the diagonal (%.3g m) from the motion, RMS over the nodes of %s, by estimate; node "
+               "%d up to "
+               "%.3g m at t=%.4g s near (%.4g, %.4g, %.4g)\n",
+               a->error, a->distance, CLI_SHOWN(r->in.model->cloths[a->cloth].name), (int)a->node, a->worst,
+               a->time, a->place[0], a->place[1], a->place[2]);
     if (!a->reached && !r->status)
         printf("accuracy  not as asked: within %.2g until t=%.4g s only; after that runs by smaller steps "
-               "part, and "
-               "the motion is not predictable\n",
+               "part\n",
                a->asked, a->until);
 }
 
@@ -591,7 +591,6 @@ static drape_status begin(run *r)
 static drape_status begin_again(void *user, drape_sim *sim, const drape_accuracy *before)
 {
     run *r = user;
-    const drape_recorder_def def = recorder_def(r);
     cli_signals_cancel(NULL);
     if (cli_interrupted())
         return DRAPE_E_STOPPED;
@@ -600,11 +599,7 @@ static drape_status begin_again(void *user, drape_sim *sim, const drape_accuracy
         fprintf(stderr, "run %d: %s\n", (int)before->runs, before->method);
     drape_recorder_destroy(&r->recorder);
     r->in.sim = sim;
-    drape_status status =
-        r->request->out ? drape_recorder_create(r->in.ctx, sim, &def, &r->recorder) : DRAPE_OK;
-    if (!status && r->recorder && !drape_scene_copy_is(r->request->command.operand, r->request->out))
-        status = drape_scene_copy(r->in.ctx, r->in.scene, drape_model_whole(r->in.model),
-                                  r->request->command.operand, drape_recorder_folder(r->recorder));
+    const drape_status status = r->request->out ? make_output(r) : DRAPE_OK;
     return status ? status : begin(r);
 }
 
