@@ -13,7 +13,7 @@ NUMBER = r"\(?(-?[0-9.]+(?:[eE][-+]?[0-9]+)?)\)?"
 NAMED = re.compile(rf"^\s*#\s*define\s+([A-Z][A-Z0-9_]*)\s+{NUMBER}\s*$|^\s*([A-Z][A-Z0-9_]*)\s*=\s*{NUMBER}\s*,?\s*$")
 REASON = re.compile(r"^\| (\w+) \| ([\w.]+) \| `(\w+)` \| `([^`]+)` \| \S.* \|$", re.M)
 # folders of src that decide a motion: their numbers have a reason
-NUMBERED = ("assemble", "colliders", "compile", "contact", "control", "geometry", "host", "integrators", "nonlinear", "realtime", "sim", "solvers", "terms", "untangle")
+NUMBERED = ("accuracy", "assemble", "colliders", "compile", "contact", "control", "geometry", "host", "integrators", "nonlinear", "realtime", "sim", "solvers", "terms", "untangle")
 
 
 def files_of(root):
