@@ -258,7 +258,7 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
 {
     switch (key->shape) {
     case DRAPE_SCENE_VALUE:
-        return names_of(object, key);
+        return key->or_number ? any_of(typed("number"), names_of(object, key)) : names_of(object, key);
     case DRAPE_SCENE_LIST:
         return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:

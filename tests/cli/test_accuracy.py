@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
 """`drape run --accuracy`: what a run says of itself, against a fine one. See program.py."""
+import json
+
 from program import drape, equal, good, read_json, read_npy, refused, run_tests, scene, text_of, write_json
 
 
@@ -37,6 +39,12 @@ def test_refusals():
         refused("run", "scene.json", "--accuracy", "1mm", *option, says="leave it out")
     for option in (("--realtime",), ("--out", "run", "--resume"), ("--out", "run", "--checkpoint-every", "2")):
         refused("run", "scene.json", "--accuracy", "1mm", *option, says="is run several times")
+
+
+def test_schema():
+    """the schema takes what a scene may say, a number or a text"""
+    key = json.loads(good("list", "--schema"))["properties"]["accuracy"]
+    equal(sorted(form["type"] for form in key["anyOf"]), ["number", "string"])
 
 
 def test_interrupted_by_a_full_disk():
