@@ -96,12 +96,14 @@ void drape_contact_rebound(const drape_contact *c, double h, const double *befor
             const double e = contact->pair.collider >= 0
                                  ? c->model->colliders[contact->pair.collider].restitution
                                  : c->model->contact.self_restitution;
+            if (!(e > 0))
+                continue;
             double mean, own;
             const double approach = rate_before(c, contact, before, &mean, &own),
                          gap = fmax(contact->gap.value - h * mean, 0),
                          speed = sqrt(fmax(approach * approach - 2 * gap * fall(c, contact), 0)),
                          more = e * speed - own - rate_of_nodes(c, contact, v);
-            if (e > 0 && more > 0 && -approach * h > contact->pair.distance && hits(c, contact, h, approach))
+            if (more > 0 && -approach * h > contact->pair.distance && hits(c, contact, h, approach))
                 push(c, contact, more, v);
         }
 }
