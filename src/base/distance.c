@@ -1,6 +1,8 @@
 /* distance.c: see distance.h. */
 #include "base/distance.h"
 
+#include "base/context.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,7 +14,9 @@ bool drape_distance_read(const char *text, drape_distance *out)
     } units[] = {{"m", {1, false}},     {"cm", {1e-2, false}}, {"mm", {1e-3, false}},
                  {"um", {1e-6, false}}, {"%", {1e-2, true}},   {"", {1, true}}};
     char *end;
+    const locale_t old = drape_locale_enter();
     const double number = strtod(text, &end);
+    drape_locale_leave(old);
     const char *unit = end + strspn(end, " ");
     for (size_t i = 0; end > text && i < sizeof units / sizeof *units; i++)
         if (strcmp(unit, units[i].name) == 0) {

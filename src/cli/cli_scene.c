@@ -59,8 +59,10 @@ int cli_run_load(const cli_command *command, const char *folder, cli_scene *out,
                           "--%s changes a simulation, and %s is a finished run; give its scene, which is "
                           "simulated again: %s/scene.json",
                           command->settings[0].option, folder, folder);
-    int code = drape_record_scene(command->ctx, folder, &path) == DRAPE_OK
-                   ? cli_scene_load(command, path, out)
+    const drape_status found = drape_record_scene(command->ctx, folder, &path);
+    int code = found == DRAPE_OK ? cli_scene_load(command, path, out)
+               : found == DRAPE_E_MEMORY
+                   ? cli_report(command, CLI_FAILED)
                    : cli_misuse(command->verb, "%s; `drape run SCENE --out DIR` writes one",
                                 drape_context_message(command->ctx));
     drape_free(command->ctx, path);

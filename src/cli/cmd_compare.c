@@ -248,15 +248,16 @@ static void print_verdict(const compare *c)
         const drape_deviation_cloth *cloth = &d->cloths[i];
         const drape_apart *most = &cloth->largest;
         const double *x = most->place[0], *y = most->place[1];
-        if (most->distance > 0)
-            printf(
-                "%s: RMS %s, %.3g %% of its diagonal of %s, at t=%.6g s; worst node %d: %s at t=%.6g s, at "
-                "(%.4g, %.4g, %.4g) m, in the second run at (%.4g, %.4g, %.4g) m\n",
-                CLI_SHOWN(cloth_name(c, i)), LENGTH(most->rms), 100 * most->rms / cloth->diagonal,
-                LENGTH(cloth->diagonal), most->rms_time, (int)most->node, LENGTH(most->distance), most->time,
-                x[0], x[1], x[2], y[0], y[1], y[2]);
-        else
+        if (!(most->distance > 0)) {
             printf("%s: all nodes at the same places\n", CLI_SHOWN(cloth_name(c, i)));
+            continue;
+        }
+        /* in pieces: the C library allocates memory for more than fourteen conversions, and may have none */
+        printf("%s: RMS %s, %.3g %% of its diagonal of %s, at t=%.6g s; ", CLI_SHOWN(cloth_name(c, i)),
+               LENGTH(most->rms), 100 * most->rms / cloth->diagonal, LENGTH(cloth->diagonal), most->rms_time);
+        printf("worst node %d: %s at t=%.6g s, at (%.4g, %.4g, %.4g) m, ", (int)most->node,
+               LENGTH(most->distance), most->time, x[0], x[1], x[2]);
+        printf("in the second run at (%.4g, %.4g, %.4g) m\n", y[0], y[1], y[2]);
     }
     printf("%" PRId64 " frames from t=%.6g s to %.6g s, of %" PRId64 " in %s and %" PRId64 " in %s\n",
            c->pair_count, time_of(c, 0), time_of(c, c->pair_count - 1), c->sides[0].run.frames,

@@ -117,6 +117,19 @@ static bool has_unused_history(drape_sim *sim, char *text, size_t size)
     return false;
 }
 
+/* The setting that makes steps smaller. */
+static const char *smaller_steps(const drape_sim *sim)
+{
+    const drape_chosen *c = &sim->chosen;
+    if (sim->model->accuracy.value > 0)
+        return "a smaller \"accuracy\"";
+    if (c->integrator->own_steps)
+        return isnan(drape_chosen_integrator_value(c, "fixed_step", NAN)) ? "a smaller rtol"
+                                                                          : "a smaller fixed_step";
+    return isnan(drape_chosen_controller_value(c, "rtol", NAN)) ? "a smaller dt"
+                                                                : "a smaller rtol of the controller";
+}
+
 /* Not where integrator or controller choose their own steps, or substeps. */
 static bool has_few_steps(drape_sim *sim, char *text, size_t size)
 {
@@ -129,8 +142,8 @@ static bool has_few_steps(drape_sim *sim, char *text, size_t size)
         return false;
     snprintf(text, size,
              "the duration of %.4g s is only %.3g steps of dt = %.4g s: for motion that is resolved, choose "
-             "a smaller dt",
-             sim->model->duration, ceil(steps), dt);
+             "%s",
+             sim->model->duration, ceil(steps), dt, smaller_steps(sim));
     return true;
 }
 
@@ -231,16 +244,6 @@ static bool ends_inside(drape_sim *sim, char *text, size_t size)
            describe_inside(sim, drape_sim_positions(sim), false, text, size);
 }
 
-/* The setting that makes steps smaller. */
-static const char *smaller_steps(const drape_chosen *c)
-{
-    if (c->integrator->own_steps)
-        return isnan(drape_chosen_integrator_value(c, "fixed_step", NAN)) ? "a smaller rtol"
-                                                                          : "a smaller fixed_step";
-    return isnan(drape_chosen_controller_value(c, "rtol", NAN)) ? "a smaller dt"
-                                                                : "a smaller rtol of the controller";
-}
-
 /* Energy that the integrator took, as a share of all that went in: by gravity, pins, colliders, hosts and
  * wind. With dt = 1/60 s over 1 s, be, bdf2 and trbdf2 take 65, 32 and 34 % in four_pins of examples/scenes,
  * 68, 45 and 11 % in sphere_drape. Where cloth is in contact it has met something, and lost energy there.
@@ -262,7 +265,7 @@ static bool dissipates_most(drape_sim *sim, char *text, size_t size)
     snprintf(text, size,
              "%s dissipated %.0f %% of the energy that went in, %.3g of %.3g J%s: %s%s dissipates less",
              integrator->entry.name, 100 * share, e.numerical, in,
-             e.contact > 0 ? ", part of it on impact" : "", smaller_steps(&sim->chosen),
+             e.contact > 0 ? ", part of it on impact" : "", smaller_steps(sim),
              integrator->order == 1 ? ", or an integrator of second order such as trbdf2 or bdf2," : "");
     return true;
 }
@@ -282,7 +285,7 @@ static bool gains_energy(drape_sim *sim, char *text, size_t size)
         text, size,
         "%s gained %.3g J out of nothing, beside %.3g J that went in: %s, or an integrator that damps what "
         "it does not resolve, such as trbdf2 or be, does not",
-        integrator->entry.name, gained, in, smaller_steps(&sim->chosen));
+        integrator->entry.name, gained, in, smaller_steps(sim));
     return true;
 }
 
@@ -304,9 +307,9 @@ static bool iterates_long(drape_sim *sim, char *text, size_t size)
         return false;
     snprintf(
         text, size,
-        "%s took %.3g Newton iterations an attempt, as where cloth buckles: a smaller dt is more accurate "
-        "there and often takes hardly longer",
-        integrator->entry.name, iterations(&s));
+        "%s took %.3g Newton iterations an attempt, as where cloth buckles: %s is more accurate there and "
+        "often takes hardly longer",
+        integrator->entry.name, iterations(&s), smaller_steps(sim));
     return true;
 }
 
@@ -339,9 +342,9 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     if (!last && (double)sim->left.above_own > MOST * (double)s.steps_accepted) {
         snprintf(text, size,
                  "%s: %lld of %lld steps were accepted although they left more than the local error of the "
-                 "method, up to %.3g J: a smaller dt comes nearer, and \"be\" solves its steps",
+                 "method, up to %.3g J: %s comes nearer, and \"be\" solves its steps",
                  sim->chosen.integrator->entry.name, (long long)sim->left.above_own,
-                 (long long)s.steps_accepted, sim->left.largest);
+                 (long long)s.steps_accepted, sim->left.largest, smaller_steps(sim));
         return true;
     }
     if (!last && !((double)s.steps_above_error > MOST * (double)s.steps_accepted))
@@ -349,10 +352,9 @@ static bool is_inaccurate(drape_sim *sim, char *text, size_t size)
     snprintf(
         text, size,
         "%s: %lld of %lld steps%s ended further from the solution of their equation than \"error\", %.3g m, "
-        "by estimate up to %.3g m: a smaller dt comes nearer, with a budget more time a "
-        "frame; \"be\" converges",
+        "by estimate up to %.3g m: %s comes nearer, with a budget more time a frame; \"be\" converges",
         sim->chosen.integrator->entry.name, (long long)s.steps_above_error, (long long)s.steps_accepted,
-        last ? ", the last among them," : "", s.error_bound, s.error_max);
+        last ? ", the last among them," : "", s.error_bound, s.error_max, smaller_steps(sim));
     return true;
 }
 
@@ -384,8 +386,8 @@ static bool is_contact_thin(drape_sim *sim, char *text, size_t size)
     snprintf(text, size,
              "/contact/distance: a collider moved by %.3g m against the mean of the cloth in a step, for an "
              "activation distance of %.3g m: "
-             "leave it out, so that it follows the motion, or take a smaller dt",
-             path, distance);
+             "leave it out, so that it follows the motion, or take %s",
+             path, distance, smaller_steps(sim));
     return true;
 }
 

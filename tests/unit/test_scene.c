@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/distance.h"
 #include "model/scene.h"
 #include "model/scene_text.h"
 #include "support/comma.h"
@@ -730,6 +731,9 @@ TEST(test_locale)
     ck_assert_int_eq(drape_scene_set(scene, "/duration", "-0.5"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(message(), "/duration: -0.5 is not allowed"));
+    drape_distance distance;
+    ck_assert(drape_distance_read("0.5cm", &distance));
+    ck_assert_double_eq(distance.value, 0.005);
     comma_end();
     close_context();
 }
