@@ -45,15 +45,17 @@ def steps_per_second(settings, rate: float) -> float:
     return rate * (settings.steps if at_least is None else max(1, int(np.ceil(at_least / rate - 1e-9))))
 
 
-def integrator(settings, rate: float) -> Dict[str, Any]:
-    """The object `integrator` of the scene."""
+def quality(settings, rate: float) -> Dict[str, Any]:
+    """The scene's `accuracy`, or its `integrator`."""
+    if settings.quality == "ACCURATE":
+        return {"accuracy": f"{settings.accuracy:.6g}m"}
     if settings.quality == "EXACT":
-        return {"method": "ida", "rtol": 1e-4}
+        return {"integrator": {"method": "ida", "rtol": 1e-4}}
     method = {"REALTIME": "newton_k", "DRAFT": "be", "STANDARD": "be", "FINE": "trbdf2"}.get(settings.quality, settings.method)
     chosen = {"method": method, "dt": 1 / steps_per_second(settings, rate)}
     if settings.quality == "CUSTOM":
         chosen["rtol"] = settings.rtol
-    return chosen
+    return {"integrator": chosen}
 
 
 def colliders_of(context, thing) -> List[Any]:
@@ -380,7 +382,7 @@ def _write(thing, samples: Samples, folder: str) -> None:
         "gravity": samples.gravity.vector.tolist(),
         "colliders": [_collider(number, surface, folder, samples) for number, surface in enumerate(samples.colliders)],
         "contact": {"distance": settings.contact_distance} if settings.contact_distance > 0 else {},
-        "integrator": integrator(settings, samples.rate),
+        **quality(settings, samples.rate),
         "duration": samples.times[-1],
         "frame_rate": samples.rate,
         "output": {"formats": ["npy"]}}

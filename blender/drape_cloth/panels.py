@@ -58,6 +58,8 @@ class DRAPE_PT_drape(Panel, bpy.types.Panel):
         if thing.drape.quality == "CUSTOM":
             layout.prop(thing.drape, "method")
             layout.prop(thing.drape, "rtol" if thing.drape.method in BY_TOLERANCE else "steps")
+        if thing.drape.quality == "ACCURATE":
+            layout.prop(thing.drape, "accuracy")
         layout.prop(thing.drape, "folder")
         row = layout.row(align=True)
         row.operator("drape.bake", icon="PHYSICS")

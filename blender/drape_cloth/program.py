@@ -86,6 +86,12 @@ def interrupts(call: Callable[[], None]) -> Iterator[None]:
         put(signal.SIGINT, of_process)
 
 
+def by_accuracy(folder: str) -> bool:
+    """Whether the scene in the folder of a bake asks for an accuracy: its run is repeated, so it has no checkpoints."""
+    with open(os.path.join(folder, SCENE), encoding="utf-8") as file:
+        return "accuracy" in json.load(file)
+
+
 class Bake:
     """`drape run` on the scene in a folder that was taken, in a process of its own. Frames appear in the folder `run`, with a checkpoint now and then, so that
     a run that is cancelled or killed can be resumed. resume: continue such a run, with the scene as it was.
@@ -94,7 +100,11 @@ class Bake:
 
     def __init__(self, program: str, folder: Folder, frames: int, resume: bool = False, threads: int = 1):
         self.folder, self.frames = folder, frames
-        self._command = [program, "run", SCENE, "--out", RUN, "--checkpoint-every", str(CHECKPOINT_EVERY), "--threads", str(threads)] + ["--resume"] * resume
+        self._command = [program, "run", SCENE, "--out", RUN, "--threads", str(threads)] + ["--resume"] * resume
+        if not by_accuracy(folder.path):
+            self._command += ["--checkpoint-every", str(CHECKPOINT_EVERY)]
+        elif resume:
+            raise Problem(f"{folder.owner.name}: a bake by accuracy is run several times, and cannot be resumed: bake it again")
         self.cancelled, self._resume = False, resume
         self._restarts = 0
         self._frames = os.path.join(folder.path, RUN, "energy.csv")

@@ -386,8 +386,9 @@ typedef struct drape_scene_def {
     const drape_cloth_def *cloths; /* at least one */
     size_t cloth_count;            /* length of cloths */
     double gravity[3];             /* [m/s2]; default 0 -9.81 0 */
-    drape_entry_def integrator;    /* default "be"; settings of any integrator are accepted, those of other
-                                   integrators are ignored */
+    drape_entry_def integrator;    /* default: "bdf2" at dt 1/60 s or, with colliders or self-contact,
+                                   "newton_k" at 1/120 s; with settings but without a type, "be". Settings
+                                   of any integrator are accepted, those of other integrators are ignored */
     drape_entry_def controller;    /* default "halving" */
     double duration;               /* [s]; the command-line program requires a value > 0; default 1 */
     double frame_rate;             /* rate of frame events [1/s]; default 60 */
@@ -630,8 +631,8 @@ typedef struct drape_realtime {
  * unless cloth touches or may touch something, steps become longer, up to realtime_step of the def; then
  * simulated time is left to the next call. A level is given up where it is expected to take more than 0.9 of
  * the budget, and a better one is resumed, one a call, where that is expected to take less than 0.6. The
- * method is that of the def, or else of the scene: by default "be", whose single steps may take far longer
- * than a frame.
+ * method is that of the def, or else of the scene. Single steps of methods other than "newton_k" may take far
+ * longer than a frame.
  *
  * The work of a call is bounded: after its first attempt at a step, accepted or rejected, no other is begun
  * that is not expected to end in time: a rejected step is then retried, at half its size, by the next call.

@@ -193,11 +193,19 @@ def run(scene: Union[Scene, Mapping, str, os.PathLike], values: Optional[Mapping
     Without `out` the frames are kept in memory, and options are those of drape.Sim. With it, the program `drape run` writes a folder, and options are its
     options (`drape run --help`), such as checkpoint_every=10, resume=True or format="npy,glb"; without a format, frames are written as npy.
 
+    accuracy="1mm", as an option or in the scene, always is a run of the program, without `out` in a temporary folder that goes with the Run; its
+    summary["accuracy_of"] says what was reached (docs/accuracy.md).
+
     A run that fails or is stopped raises an exception in both cases, and `run` of the exception is the run up to there."""
     scene = Scene(scene)
     if not isinstance(values, (Mapping, type(None))):
         raise TypeError(f"values: needs a dictionary of pointers and values, has {type(values).__name__}; a folder is given by out=")
     scene.update(values or {})
+    if out is None and ("accuracy" in options or scene.get("/accuracy") is not None):
+        folder = tempfile.TemporaryDirectory(prefix="drape-")  # pylint: disable=consider-using-with
+        result = run(scene, out=os.path.join(folder.name, "run"), **options)
+        result._temporary = folder
+        return result
     if out is None:
         return Sim(scene, **options).record()
     if "format" not in options and "npy" not in (scene.get("/output/formats") or []):

@@ -2,6 +2,7 @@
 #include "accuracy/accuracy.h"
 
 #include "accuracy/refinement.h"
+#include "base/elementary.h"
 #include "geometry/deviation.h"
 
 #include <math.h>
@@ -201,6 +202,22 @@ static drape_status go_on_cheaply(accurate *a, const drape_sim_def *given)
     return status ? status : drape_sim_advance(t->sim, a->end);
 }
 
+/* How far the runs would be apart at the end, if their distance grows on by the factor that it took on over
+ * the last doubling: as where small differences grow exponentially. */
+static double expect(const accurate *a, bool whole)
+{
+    const int64_t last = a->apart.frames - 1;
+    int64_t k = last;
+    if (last < 0)
+        return NAN;
+    if (whole || !(a->largest[last] > 0))
+        return a->largest[last];
+    while (k > 0 && 2 * a->largest[k] > a->largest[last])
+        k--;
+    const double doubling = fmax(a->times[last] - a->times[k], ROUNDING * a->end);
+    return a->largest[last] * drape_pow(2, (a->end - a->times[last]) / doubling);
+}
+
 /* Compares the ends of both runs; false: one has not reached its end. */
 static bool compare_ends(accurate *a)
 {
@@ -237,6 +254,7 @@ static drape_status refine(accurate *a, const drape_sim_def *given)
         const double time =
             t->compares && a->apart.frames > 0 ? a->times[a->apart.frames - 1] : drape_sim_time(t->sim);
         const drape_level_result result = {.apart = a->apart.frames > 0 ? largest(a) : NAN,
+                                           .expected = expect(a, whole),
                                            .fraction =
                                                whole || (!t->compares && !failure && t->over)
                                                    ? 1

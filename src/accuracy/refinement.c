@@ -1,6 +1,7 @@
 /* refinement.c: see refinement.h. */
 #include "accuracy/refinement.h"
 
+#include "base/elementary.h"
 #include "base/vec3.h"
 
 #include <math.h>
@@ -10,6 +11,7 @@
 #define LEAST_STEP    1e-7 /* of the duration */
 #define FIRST_RTOL    10.0 /* times the accuracy */
 #define LARGEST_RTOL  0.1
+#define FINE_RTOL     0.1 /* times the accuracy: of the second level with error control */
 #define LEAST_RTOL    1e-9
 #define SAME          1.3 /* distances that differ by less do not converge */
 #define LONGER        1.1 /* times that two runs agree, which grow by less, do not grow */
@@ -95,8 +97,10 @@ static bool next_controlled(drape_refinement *l, const drape_level_result *r)
         l->before = NAN;
         return halve(l);
     }
-    l->level.value /= 10;
-    l->level.share = tenth_share[l->hits];
+    /* the first of them that is compared is far from one that costs little */
+    const double from = l->level.value;
+    l->level.value = l->level.share == 1 ? FINE_RTOL * l->accuracy : from / 10;
+    l->level.share = drape_pow(tenth_share[l->hits], drape_ln(from / l->level.value) / drape_ln(10));
     return l->stuck < MOST_STUCK && l->level.value > LEAST_RTOL;
 }
 
@@ -117,7 +121,6 @@ static bool converges(const drape_refinement *l, const drape_level_result *r)
 
 bool drape_refinement_next(drape_refinement *l, const drape_level_result *r)
 {
-    const bool other = l->level.controlled && l->level.share == 1; /* than the one before */
     const double error = drape_refinement_error(l, r->apart, r->fraction >= 1);
     if (r->fraction >= 1 && error <= l->accuracy)
         return false;
@@ -127,18 +130,18 @@ bool drape_refinement_next(drape_refinement *l, const drape_level_result *r)
         return false;
     l->stuck = converges(l, r) ? 0 : l->stuck + 1;
     if (l->level.controlled) {
-        l->before = other ? NAN : r->apart;
+        l->before = l->level.value < FINE_RTOL * l->accuracy ? r->apart : NAN;
         l->parted = r->fraction;
         return next_controlled(l, r);
     }
     l->fixed = l->level;
-    l->fixed_error = error;
+    l->fixed_error = error * (r->expected / r->apart);
     l->fixed_work = r->work / r->fraction;
     if (whole_pair(l, r))
         l->gain = fmin(fmax(l->before / r->apart, LEAST_RATIO), l->gain);
     l->before = r->apart;
     l->parted = r->fraction;
-    if (!l->can_control || work_of_halvings(l, error) < 2 * l->spent || isnan(r->apart) ||
+    if (!l->can_control || work_of_halvings(l, l->fixed_error) < 2 * l->spent || isnan(r->apart) ||
         (l->stuck == 0 && r->fraction >= 1 && error <= l->gain * l->accuracy))
         return l->stuck < MOST_STUCK && halve(l);
     l->before = NAN;
@@ -147,6 +150,6 @@ bool drape_refinement_next(drape_refinement *l, const drape_level_result *r)
                              .value = fmin(FIRST_RTOL * l->accuracy, LARGEST_RTOL),
                              .controlled = true,
                              .share = 1,
-                             .most = work_of_halvings(l, error)};
+                             .most = work_of_halvings(l, l->fixed_error)};
     return true;
 }

@@ -25,6 +25,7 @@ typedef struct drape_level {
 /* What a level has shown, in a run that may have been cut short. */
 typedef struct drape_level_result {
     double apart;    /* [1] largest distance to the level before; NAN: there is none */
+    double expected; /* [1] the same until the end, if it grows on as it did */
     double fraction; /* of the run that was made */
     double work;   /* evaluations of the residual, and of the matrix with its factors, which count as four */
     bool failed;   /* a step could not be made */

@@ -502,6 +502,7 @@ static void print_accuracy(const run *r)
 static void print_results(run *r)
 {
     const drape_model *model = r->in.model;
+    const drape_chosen *chosen = &r->in.sim->chosen;
     const drape_statistics s = drape_sim_statistics(r->in.sim);
     const drape_energy e = drape_sim_energy(r->in.sim);
     const struct {
@@ -515,6 +516,13 @@ static void print_results(run *r)
       energies[] = {{"kinetic", e.kinetic}, {"elastic", e.elastic},       {"gravity", e.gravity},
                     {"contact", e.contact}, {"dissipated", e.dissipated}, {"numerical", e.numerical}};
     printf("status    %s\n", drape_status_name(r->status));
+    printf("method    %s", chosen->integrator->entry.name);
+    if (!chosen->integrator->own_steps && !chosen->integrator->steady_state)
+        printf(", dt %.3g s", drape_chosen_integrator_value(chosen, "dt", NAN));
+    if (chosen->usual && !r->accurate)
+        printf(": the default %s contact; --accuracy says how near it is",
+               model->collider_count > 0 || model->contact.self ? "with" : "without");
+    putchar('\n');
     printf("model     %d nodes, %lld degrees of freedom, %lld nonzeros\n", (int)drape_model_node_count(model),
            (long long)drape_model_dof_count(model), (long long)drape_model_nonzero_count(model));
     printf("time      %.9g of %.9g s\n", drape_sim_time(r->in.sim), drape_model_duration(model));

@@ -48,12 +48,6 @@ drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def
     return drape_arena_status(&model->arena);
 }
 
-/* The default of a key whose value is a text. */
-static const char *default_text(const char *pointer)
-{
-    return drape_scene_key_at(pointer)->param.derived;
-}
-
 static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
 {
     memcpy(model->gravity, def->gravity, sizeof model->gravity);
@@ -64,10 +58,8 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/accuracy", "is \"%.60s\"; it must be %s",
                              def->accuracy, DRAPE_DISTANCE_FORM);
     model->z_up = def->up && strcmp(def->up, "z") == 0;
-    DRAPE_TRY(drape_compile_choice(model, &def->integrator, default_text("/integrator/method"),
-                                   &model->integrator));
-    DRAPE_TRY(
-        drape_compile_choice(model, &def->controller, default_text("/controller/type"), &model->controller));
+    DRAPE_TRY(drape_compile_choice(model, &def->integrator, "be", &model->integrator));
+    DRAPE_TRY(drape_compile_choice(model, &def->controller, "halving", &model->controller));
     model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
     if (!model->formats)
         return DRAPE_E_MEMORY;

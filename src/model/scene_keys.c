@@ -164,7 +164,9 @@ static const drape_scene_object term = {.name = "term",
                                         .def_size = sizeof(drape_entry_def)};
 
 static const drape_scene_key integrator_keys[] = {
-    {TEXT_OR("method", "be", "name of a time integrator"), IN(drape_entry_def, type)},
+    {DRAPE_TEXT("method", "name of a time integrator",
+                .derived = "\"be\"; in a scene without \"integrator\" bdf2 or, with contact, newton_k"),
+     IN(drape_entry_def, type)},
 };
 static const drape_scene_object integrator = {
     .name = "integrator", KEYS(integrator_keys), SETTINGS(drape_entry_def, settings, setting_count)};

@@ -150,6 +150,20 @@ void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
     drape_def_fill(def, struct_size, &defaults, sizeof defaults);
 }
 
+/* The default, nearer to the motion than backward Euler at 1/60 s for about its time (docs/accuracy.md).
+ * Where nothing can touch, steps of second order; with contact, where every method is of first order,
+ * shorter ones that are not solved to the end. Ranks have backward Euler. */
+static drape_choice usual_choice(const drape_model *model, drape_setting *dt)
+{
+    const bool touches = model->collider_count > 0 || model->contact.self;
+    *dt = (drape_setting){.name = "dt", .number = touches ? 1.0 / 120 : 1.0 / 60};
+    return (drape_choice){.type = model->part ? "be"
+                                  : touches   ? "newton_k"
+                                              : "bdf2",
+                          .settings = dt,
+                          .setting_count = !model->part};
+}
+
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen)
 {
@@ -158,8 +172,12 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
     const drape_sim_def *d = def ? def : &none;
     const choice integrators = {"/integrator", "method", &drape_integrator_registry, !def},
                  controllers = {"/controller", "type", &drape_controller_registry, !def};
+    drape_setting dt;
     int i = 0, c = 0;
-    drape_status status = choose(ctx, &integrators, d->integrator, &model->integrator, d->integrator_settings,
+    chosen->usual = !model->integrator_named && model->integrator.setting_count == 0 && !d->integrator &&
+                    d->integrator_setting_count == 0 && d->dt == 0;
+    const drape_choice scene = chosen->usual ? usual_choice(model, &dt) : model->integrator;
+    drape_status status = choose(ctx, &integrators, d->integrator, &scene, d->integrator_settings,
                                  d->integrator_setting_count, chosen->integrator_values, &i);
     if (!status)
         status = apply_number(ctx, &integrators, i, "dt", d->dt, chosen->integrator_values);

@@ -10,6 +10,7 @@ typedef struct drape_chosen {
     const drape_integrator_ops *integrator;
     const drape_controller_ops *controller;
     double integrator_values[DRAPE_MAX_PARAMS], controller_values[DRAPE_MAX_PARAMS];
+    bool usual; /* neither scene nor def says anything of the integrator */
 } drape_chosen;
 
 /* The scene's choices, overridden by def. NULL: they are only checked, without the

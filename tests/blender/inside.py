@@ -165,6 +165,20 @@ def test_table_cloth():
     assert [modifier.name for modifier in cloth.modifiers] == ["Smoother"] and os.path.exists(folder + "/cloth.pc2")
 
 
+def test_accuracy():
+    """a bake by accuracy is run until it is as near to the motion as asked, and plays; it is not resumed"""
+    new_file()
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    cloth = sheet(quality="ACCURATE", accuracy=0.1, pin_group="rim", air=False)
+    cloth.vertex_groups.new(name="rim").add(list(range(8)), 1, "REPLACE")
+    folder = bake(cloth)
+    assert len(plays(cloth, folder)) == FRAMES
+    with open(folder + "/run/summary.json", encoding="utf-8") as file:
+        reached = json.load(file)["accuracy_of"]
+    assert reached["runs"] >= 2 and reached["distance"] < 0.1, reached
+    assert "cannot be resumed" in refused(cloth, "resume")
+
+
 def test_transform_and_unit():
     """a cloth that is turned, scaled unevenly and carried by a parent in a scene of centimetres plays in the world where Drape has it"""
     scene = new_file()
@@ -823,9 +837,10 @@ def test_choices():
         cloth.drape.quality = quality
         for method in [item[0] for item in settings.METHODS] if quality == "CUSTOM" else ["be"]:
             cloth.drape.method = method
-            chosen = scene_of(bake(cloth))["integrator"]
+            made = scene_of(bake(cloth))
             assert len(positions(operators.folder_of(cloth))) == 2
-            assert chosen["method"] == method or quality != "CUSTOM"
+            assert quality != "CUSTOM" or made["integrator"]["method"] == method
+            assert ("accuracy" in made) == (quality == "ACCURATE") != ("integrator" in made)
     cloth.drape.quality = "REALTIME"
     for name in names:
         cloth.drape.fabric = name

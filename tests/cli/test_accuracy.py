@@ -47,6 +47,21 @@ def test_schema():
     equal(sorted(form["type"] for form in key["anyOf"]), ["number", "string"])
 
 
+def test_default():
+    """a scene that says nothing of its integrator is run by the method for what it has; one setting, and it is backward Euler, as ever"""
+    ball = {"type": "sphere", "center": [0, -9, 0], "radius": 0.1}
+    for more, method, dt in (({}, "bdf2", "0.0167"), ({"colliders": [ball]}, "newton_k", "0.00833"), ({"self_contact": {"thickness": 0.001}}, "newton_k", "0.00833")):
+        whole = scene(duration=0.05, **more)
+        del whole["integrator"]
+        write_json("default.json", whole)
+        printed = good("run", "default.json", "--out", "default")
+        assert f"method    {method}, dt {dt} s: the default with{'' if more else 'out'} contact" in printed, printed
+        good("run", "default/scene.json", "--out", "again")
+        equal(read_json("again/summary.json")["hash"], read_json("default/summary.json")["hash"])
+        assert "\nmethod    be, dt 0.01 s\n" in good("run", "default.json", "--dt", "0.01")
+        assert "\nmethod    midpoint, dt 0.0167 s\n" in good("run", "default.json", "--integrator", "midpoint")
+
+
 def test_interrupted_by_a_full_disk():
     """a run that fails leaves one line and no claim"""
     write_scene()

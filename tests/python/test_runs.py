@@ -44,6 +44,15 @@ def test_runs():
     equal(drape.Model(again.scene).node_count, 36)
 
 
+def test_accuracy():
+    """a run by accuracy is made by the program, as an option or by the scene, and says what it reached"""
+    for run in (drape.run(sheet(integrator={}), accuracy="5cm"), drape.run(sheet(accuracy="5cm"))):
+        reached = run.summary["accuracy_of"]
+        assert reached["runs"] >= 2 and 0 < reached["distance"] < 0.05, reached
+        equal((run.summary["status"], len(run.positions)), ("ok", len(run.times)))
+    raises(drape.ArgumentError, drape.run, sheet(accuracy="1 inch"), says="/accuracy")
+
+
 def test_failures():
     """a run that fails has the status and the message; what the program refuses is an argument error"""
     stops = sheet(controller={"type": "fixed"}, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})

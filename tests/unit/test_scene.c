@@ -160,7 +160,7 @@ TEST(test_host_defaults)
     drape_scene_def_init(&def, sizeof def);
     drape_mesh_def_init(&mesh, sizeof mesh);
     check_vector(def.gravity, 0, -9.81, 0);
-    ck_assert_str_eq(def.integrator.type, "be");
+    ck_assert_ptr_null(def.integrator.type);
     ck_assert_str_eq(def.controller.type, "halving");
     ck_assert_double_eq(def.duration, 1);
     ck_assert_double_eq(def.frame_rate, 60);
