@@ -1183,17 +1183,26 @@ typedef struct drape_energy {
                        in some directions only count with all of their velocity; and of terms with
                        an energy of motion, such as air.added_mass, what is quadratic in it */
     double elastic; /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
-    double gravity; /* [J] of the weight, zero at the origin, and of loads with a potential, such as -p V of
-                          load.pressure, or that of steady wind on air.added_mass */
+    double gravity; /* [J] of the weight, zero at the origin; what loads do is in drape_sim_work */
     double contact; /* [J] of pairs that are closer than their activation distance; NaN, and `numerical` too:
                        there was no memory to find them */
-    double dissipated; /* [J] work taken by damping and drag terms since t = 0 or drape_sim_set_state */
-    double numerical;  /* [J] the rest of the balance, after the work of moving pins and colliders and of
-                          drape_sim_push: the integrator's own dissipation; negative: a gain */
+    double dissipated; /* [J] taken by damping, friction and drag in still air since t = 0 or
+                          drape_sim_set_state */
+    double numerical;  /* [J] the rest of the balance, after what drape_sim_work has: the integrator's own
+                          dissipation; negative: a gain */
 } drape_energy;
 
 /* Sums the energies of the last accepted state. */
 DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
+
+/* The work [J], int F . v dt, that has been done on the cloth since t = 0 or drape_sim_set_state, negative
+ * where it took energy: of "pins" and supports that move; of "colliders" that move, with changes of the law
+ * of contact; of the "host", who pushes, drags, places and changes cloth; of each load, wind and other term
+ * that may do any, such as "drag.wind of flag". The sum of a drape_energy less that of all works is constant.
+ * index starts at 0; past the last, *work is 0 and the result NULL. Names are valid until the sim changes or
+ * is destroyed; what drape_sim_change takes away is forgotten. On several ranks: as of the last
+ * drape_sim_energy. */
+DRAPE_API const char *drape_sim_work(drape_sim *sim, int index, double *work);
 
 /* The distribution of the elastic energy of the last accepted state: density (node_count) [J/m2]. The energy
  * of each element is divided equally among its nodes, and each node's share is divided by the area that is

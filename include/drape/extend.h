@@ -407,11 +407,12 @@ typedef struct drape_term_ops {
     const char *element_name; /* "edge", "hinge", "node": for messages */
     int nodes;                /* nodes per element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;              /* energy: its Hessian is zero and needs no sparsity */
-    bool external;     /* energy: the potential of an external load. It is counted under the energy of gravity
-                      instead of the elastic energy, and its forces may have a resultant and a torque */
-    bool convex;       /* its Hessian is positive semidefinite in every state: of a measure, ddq, as that of a
+    bool external; /* energy: the potential of an external load; dissipation: a load without one. What it does
+                      is work (drape_sim_work), no elastic energy and no dissipation, and its forces may have
+                      a resultant and a torque */
+    bool convex;   /* its Hessian is positive semidefinite in every state: of a measure, ddq, as that of a
                           length; of an energy, hess */
-    bool has_internal; /* each element has internal variables */
+    bool has_internal;  /* each element has internal variables */
     int internal_count; /* internal variables per element, stored consecutively; 0 means 1 */
     bool constraint; /* an energy that enforces a limit; integrators that enforce limits by moving nodes omit
                         it */
@@ -472,7 +473,7 @@ typedef struct drape_term_ops {
                           const double *internal, drape_fault *fault);
 
     /* dissipation: it acts against a medium. v is then the velocity relative to the wind of
-     * drape_sim_set_wind. */
+     * drape_sim_set_wind. Where it pushes cloth at rest, what it does is work (drape_sim_work). */
     bool in_medium;
 
     /* Optional, beside measure: replaces ddq by the matrix for which force ddq is the positive semidefinite

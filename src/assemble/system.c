@@ -38,9 +38,11 @@ struct drape_system {
     drape_drag_springs drag;
     double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
-    double *load; /* (node_count x 3) scratch, if the model has histories */
-    double
-        *moving[2]; /* (node_count x 3) scratch: momenta, and no velocity, if a term has a kinetic energy */
+    double *work;        /* see drape_system_work */
+    bool *drives;        /* (term_count) the terms that did work at the last drape_system_dissipation */
+    double *load;        /* (node_count x 3) scratch, if the model has histories */
+    double *moving;      /* (node_count x 3) scratch: momenta, if a term has a kinetic energy */
+    double *still;       /* (node_count x 3) no velocity */
     double *middle[2];   /* (node_count x 3) scratch: x and v of a step, if directions turn */
     double *held;        /* (node_count x 3) [N] the last forces on supports; NULL: none of them moves */
     bool in_frame;       /* positions are in the frame of the supports, and the next of these are scratch: */
@@ -66,10 +68,13 @@ static drape_status create(drape_arena *arena, const drape_model *model, int thr
                              .extension = drape_arena_within(arena),
                              .ranks = drape_model_ranks(model)};
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
+    system->work = drape_arena_take(arena, drape_system_work_count(system), sizeof *system->work);
+    system->drives = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->drives);
     if (model->history_count > 0)
         system->load = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->load);
-    for (int k = 0; k < 2 && model->has_kinetic; k++)
-        system->moving[k] = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof(double));
+    system->still = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->still);
+    if (model->has_kinetic)
+        system->moving = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->moving);
     bool turns = false;
     for (int32_t i = 0; i < model->term_count && !turns; i++)
         turns = drape_term_turns(&model->terms[i]);
@@ -250,6 +255,21 @@ bool drape_system_is_driven(const drape_system *system)
 {
     const bool pins = drape_ranks_any(system->ranks, system->motion->moved_count > 0);
     return pins || system->model->collider_count > 0 || system->model->supports_move;
+}
+
+double *drape_system_work(const drape_system *system)
+{
+    return system->work;
+}
+
+void drape_system_begin_work(drape_system *system)
+{
+    memset(system->work, 0, drape_system_work_count(system) * sizeof *system->work);
+}
+
+size_t drape_system_work_count(const drape_system *system)
+{
+    return DRAPE_BY_TERMS + (size_t)system->model->term_count;
 }
 
 /* ---- Steps ---- */
@@ -593,10 +613,56 @@ void drape_system_project_matrix(const drape_system *system, double *values)
     drape_supports_project_matrix(system->motion, system->pattern, values);
 }
 
-void drape_system_dissipation(drape_system *system, const drape_point *given, double *g)
+/* g = the dissipative forces of one term. */
+static void term_forces(drape_system *system, int32_t term, const drape_point *point, double *g)
+{
+    drape_request want = {.point = point, .dissipative = true};
+    evaluate_wind(system, &want);
+    memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
+    drape_summer_add_term(system->summer, &system->model->terms[term], &want, &(drape_sums){.g = g}, NULL);
+}
+
+/* Whether a term does work instead of dissipating: it is a load, or its medium pushes cloth at rest.
+ * Overwrites g (nodes). */
+static bool drives(drape_system *system, int32_t term, const drape_point *at, double *g)
+{
+    const drape_term_ops *ops = system->model->terms[term].ops;
+    drape_point rest = *at;
+    bool found = ops->external;
+    if (!ops->dissipation || !ops->in_medium)
+        return ops->dissipation && found;
+    rest.v = system->still;
+    term_forces(system, term, &rest, g);
+    for (size_t i = 0; i < 3 * (size_t)system->model->node_count && !found; i++)
+        found = g[i] != 0;
+    return drape_ranks_any(system->ranks, found);
+}
+
+/* The work over a time against forces g (nodes) at a point. */
+static double taken(const drape_system *system, const drape_point *point, double time, const double *g)
+{
+    const double *span = point->span;
+    double power = 0;
+    for (size_t i = 0; i < 3 * (size_t)system->model->node_count; i++)
+        power += drape_model_owns(system->model, (int32_t)(i / 3)) ? g[i] * point->v[i] : 0;
+    power = drape_ranks_sum(system->ranks, power);
+    if (span[1] > span[0])
+        power += drape_system_support_work(system, g, span[0], span[1]) / (span[1] - span[0]);
+    return time * power;
+}
+
+double drape_system_dissipation(drape_system *system, const drape_point *given, double time, double *g)
 {
     const drape_point point = point_in_space(system, given);
-    add_forces(system, (drape_request){.point = &point, .dissipative = true}, g);
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        system->drives[i] = drives(system, i, &point, g);
+        if (system->drives[i]) {
+            term_forces(system, i, &point, g);
+            system->work[DRAPE_BY_TERMS + i] -= taken(system, given, time, g);
+        }
+    }
+    add_forces(system, (drape_request){.point = &point, .dissipative = true, .without = system->drives}, g);
+    return taken(system, given, time, g);
 }
 
 /* ---- Jacobians ---- */
@@ -762,8 +828,8 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
 static double measure_motion(drape_system *system, const drape_term *term, const drape_request *want)
 {
     double energy = 0;
-    memset(system->moving[0], 0, 3 * (size_t)system->model->node_count * sizeof *system->moving[0]);
-    drape_summer_add_term(system->summer, term, want, &(drape_sums){.g = system->moving[0]}, &energy);
+    memset(system->moving, 0, 3 * (size_t)system->model->node_count * sizeof *system->moving);
+    drape_summer_add_term(system->summer, term, want, &(drape_sums){.g = system->moving}, &energy);
     return energy;
 }
 
@@ -771,7 +837,7 @@ void drape_system_motion_energy(drape_system *system, const drape_point *point, 
                                 double *potential)
 {
     drape_point rest = *point;
-    rest.v = system->moving[1];
+    rest.v = system->still;
     *kinetic = *potential = 0;
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
@@ -784,7 +850,7 @@ void drape_system_motion_energy(drape_system *system, const drape_point *point, 
         evaluate_wind(system, &want);
         *kinetic += still - measure_motion(system, term, &want);
         for (size_t k = 0; k < 3 * (size_t)system->model->node_count; k++)
-            *kinetic += system->moving[0][k] * point->v[k];
+            *kinetic += system->moving[k] * point->v[k];
         *potential -= still;
     }
 }
@@ -921,44 +987,57 @@ static double gust_work(drape_system *system, const drape_term *term, const drap
     return work;
 }
 
-/* Adds to *dissipated only what is known here. */
-static double timed_work_here(drape_system *system, const drape_state *before, const drape_state *after,
-                              double *open, double *dissipated)
+/* That of one term here; adds to *dissipated only what is known here. */
+static double timed_work_of(drape_system *system, const drape_term *term, const drape_state *before,
+                            const drape_state *after, double *open, double *dissipated)
 {
     const drape_point from = {.x = before->x, .v = before->v, .internal = before->internal, .t = before->t},
                       to = {.x = after->x, .v = after->v, .internal = before->internal, .t = after->t};
     double work = 0;
-    for (int32_t i = 0; i < system->model->term_count; i++) {
-        const drape_term *term = &system->model->terms[i];
-        if (drape_term_is_timed(term) && has_energy(system, term))
-            work += timed_work(system, term, &from, &to);
-        if (term->history && has_energy(system, term))
-            work += history_work(system, term, &from, &to, open);
-        if (term->ops->kinetic && (term->history || drape_system_has_wind(system)))
-            work += gust_work(system, term, &from, &to);
-        if (drape_term_turns(term)) {
-            const double loss = dissipated ? turning_dissipation(system, term, &from, &to) : 0;
-            work += turning_work(system, term, &from, &to) + loss;
-            if (dissipated)
-                *dissipated += loss;
-        }
+    if (drape_term_is_timed(term) && has_energy(system, term))
+        work += timed_work(system, term, &from, &to);
+    if (term->history && has_energy(system, term))
+        work += history_work(system, term, &from, &to, open);
+    if (term->ops->kinetic && (term->history || drape_system_has_wind(system)))
+        work += gust_work(system, term, &from, &to);
+    if (drape_term_turns(term)) {
+        const double loss = dissipated ? turning_dissipation(system, term, &from, &to) : 0;
+        work += turning_work(system, term, &from, &to) + loss;
+        if (dissipated)
+            *dissipated += loss;
     }
     return work;
 }
 
-double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
-                               double *open, double *dissipated)
+void drape_system_add_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
+                                 double *work, double *open, double *dissipated)
 {
-    double opened = 0, lost = 0;
-    if (!system->ranks)
-        return timed_work_here(system, before, after, open, dissipated);
-    if (!drape_system_is_timed(system))
-        return 0;
-    const double work = timed_work_here(system, before, after, &opened, dissipated ? &lost : NULL);
-    *open += drape_ranks_sum(system->ranks, opened);
-    if (dissipated)
-        *dissipated += drape_ranks_sum(system->ranks, lost);
-    return drape_ranks_sum(system->ranks, work);
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        double opened = 0, lost = 0;
+        if (!drape_term_changes(term) && !term->ops->kinetic)
+            continue;
+        work[DRAPE_BY_TERMS + i] += drape_ranks_sum(
+            system->ranks, timed_work_of(system, term, before, after, &opened, dissipated ? &lost : NULL));
+        *open += drape_ranks_sum(system->ranks, opened);
+        if (dissipated)
+            *dissipated += drape_ranks_sum(system->ranks, lost);
+    }
+}
+
+double drape_system_measure_loads(drape_system *system, const drape_point *point, double *potential)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *t = &system->model->terms[i];
+        if (!t->ops->external || t->ops->from_scene_gravity || !has_energy(system, t))
+            continue;
+        const double energy = drape_ranks_sum(system->ranks, energy_at(system, t, point));
+        sum += energy;
+        if (potential)
+            potential[DRAPE_BY_TERMS + i] = energy;
+    }
+    return sum;
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)

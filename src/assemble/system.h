@@ -90,13 +90,26 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* Whether a term depends on time, and the work that this does in a step from one state to another [J], by the
- * internal variables of the former. *open grows by the possible error of that work: a history may change
- * within the step, of which some integrators see only the end. *dissipated grows by what of the work is
- * done on dashpots; NULL: nothing moves them. */
+/* What does work on cloth from outside; from DRAPE_BY_TERMS on, each term of the model. */
+enum { DRAPE_BY_PINS, DRAPE_BY_COLLIDERS, DRAPE_BY_HOST, DRAPE_BY_TERMS };
+
+/* The work of each in a step (drape_system_work_count) [J], to which integrators add; 0 after
+ * drape_system_begin_work. That of loads with a potential is what their change by itself does. */
+double *drape_system_work(const drape_system *system);
+size_t drape_system_work_count(const drape_system *system);
+void drape_system_begin_work(drape_system *system);
+
+/* Whether a term depends on time. The second adds to work the work that this does in a step from one state
+ * to another [J], by the internal variables of the former. *open grows by the possible error of that work: a
+ * history may change within the step, of which some integrators see only the end. *dissipated grows by what
+ * of the work is done on dashpots; NULL: nothing moves them. */
 bool drape_system_is_timed(const drape_system *system);
-double drape_system_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
-                               double *open, double *dissipated);
+void drape_system_add_timed_work(drape_system *system, const drape_state *before, const drape_state *after,
+                                 double *work, double *open, double *dissipated);
+
+/* The sum of the potentials of loads at a point [J], which drape_system_energy has in `gravity`; and of each
+ * of them (drape_system_work_count), unless NULL. */
+double drape_system_measure_loads(drape_system *system, const drape_point *point, double *potential);
 
 /* From now on the medium moves with this field, if the model has a term that feels it; NULL: it is at
  * rest. */
@@ -242,8 +255,11 @@ bool drape_system_has_remainder(const drape_system *system);
 /* values (pattern.nonzeros) = D = dg/dv over the free nodes, in continuous time. */
 void drape_system_damping(drape_system *system, const drape_point *point, double *values);
 
-/* The dissipative part of g: dissipative laws, and terms and friction that dissipate energy. */
-void drape_system_dissipation(drape_system *system, const drape_point *point, double *g);
+/* The dissipative part of g: dissipative laws, and terms and friction that dissipate energy. Returns what it
+ * takes over a time [s] from nodes and supports, at the velocities of the point and the mean ones in its span
+ * [J]. Loads without a potential, and terms whose medium pushes cloth at rest, are no part of it: what they
+ * do in that time is added to the work of the system. */
+double drape_system_dissipation(drape_system *system, const drape_point *point, double time, double *g);
 
 /* Force on each collider at the last drape_system_force, or its dissipative part at the last
  * drape_system_dissipation (collider_count), with the sign of g; NULL without contact. */

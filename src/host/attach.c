@@ -23,7 +23,7 @@ static drape_status carry(drape_sim *sim, int32_t collider, int32_t count, const
                           const int32_t *triangles)
 {
     /* contact may need memory for its energy; a sim that was made for new pins has it */
-    const drape_energy before = drape_sim_energy(sim);
+    const drape_energy before = drape_sim_account(sim);
     if (drape_system_status(sim->system) == DRAPE_E_MEMORY) {
         sim->energy_known = false;
         return DRAPE_E_MEMORY;
@@ -37,7 +37,7 @@ static drape_status carry(drape_sim *sim, int32_t collider, int32_t count, const
         drape_motion_pin_velocity(motion, motion->place[nodes[i]], now->t, now->t,
                                   now->v + 3 * (size_t)nodes[i]);
     sim->chosen.integrator->restart(sim->integrator, now);
-    drape_sim_shift_energy(sim, &before);
+    drape_sim_shift_energy(sim, &before, DRAPE_BY_HOST);
     return DRAPE_OK;
 }
 

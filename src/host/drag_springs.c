@@ -49,7 +49,7 @@ static drape_status set(drape_sim *sim, const char *function, int32_t count, con
         const double work = drape_drag_springs_energy(&springs, x) -
                             drape_drag_springs_energy(drape_system_drag_springs(sim->system), x);
         drape_system_set_drag_springs(sim->system, &springs);
-        sim->audit.pin_work += work;
+        sim->work[DRAPE_BY_HOST] += work;
         sim->audit.offered += fabs(work);
         sim->energy_known = sim->attempted_known = false;
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));

@@ -157,7 +157,7 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
     const drape_status status = drape_sim_check_place(sim, cloths, colliders, by);
     if (status)
         return status;
-    const drape_energy before = drape_sim_energy(sim);
+    const drape_energy before = drape_sim_account(sim);
     place_nodes(sim, cloths, by, stop, next);
     /* Springs by which a host drags nodes go with them. */
     drape_drag_springs springs = *drape_system_drag_springs(sim->system);
@@ -169,7 +169,7 @@ drape_status drape_sim_place_parts(drape_sim *sim, const drape_place_list *cloth
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
     drape_sim_forget_past(sim);
-    drape_sim_shift_energy(sim, &before);
+    drape_sim_shift_energy(sim, &before, DRAPE_BY_HOST);
     return DRAPE_OK;
 }
 

@@ -254,19 +254,20 @@ int drape_first_order_solve_rhs(SUNLinearSolver solver, SUNMatrix matrix, N_Vect
 
 /* ---- Work of dissipation, pins and colliders ---- */
 
-/* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that move pins and
- * colliders. */
-static void measure_powers(drape_first_order *s, double t, double powers[2])
+/* Powers at the state in s->x, s->v at time t. */
+static void measure_powers(drape_first_order *s, double t, double *powers)
 {
     const drape_point point = point_at(s, t);
-    powers[0] = s->dissipated ? drape_instant_dissipation(s->system, &point, s->dissipated) : 0;
-    powers[1] = 0;
+    const size_t works = drape_system_work_count(s->system);
+    drape_system_begin_work(s->system);
+    powers[works] = s->dissipated ? drape_instant_dissipation(s->system, &point, 1, s->dissipated) : 0;
+    memcpy(powers, drape_system_work(s->system), works * sizeof *powers);
     if (drape_system_is_driven(s->system)) {
         drape_system_force(s->system, &point, s->g);
-        powers[1] = drape_instant_driving(s->system, &point, s->g);
+        drape_instant_driving(s->system, &point, s->g, 1, powers);
     }
     if (s->ranks)
-        s->ranks->sum(s->ranks, powers, 2);
+        s->ranks->sum(s->ranks, powers, DRAPE_BY_TERMS);
 }
 
 /* ---- A step ---- */
@@ -337,14 +338,14 @@ static drape_status prepare(drape_first_order *s, const drape_state *in, double 
         const double most = s->values[DRAPE_FIRST_ORDER_MAX_STEP];
         *t = fmin(*t, in->t + (isnan(most) ? s->model->duration / DRAPE_STEPS_WITHOUT_UNKNOWNS : most));
         drape_instant_place_pins(s->motion, in->t, s->span, s->x, s->v);
-        measure_powers(s, in->t, s->powers);
+        measure_powers(s, in->t, s->powers[0]);
         return DRAPE_OK;
     }
     if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t)) {
         drape_status status = start(s, in, h < end - in->t ? h : 0, info);
         if (status)
             return status;
-        measure_powers(s, in->t, s->powers);
+        measure_powers(s, in->t, s->powers[0]);
     }
     return DRAPE_OK;
 }
@@ -421,11 +422,14 @@ drape_status drape_first_order_step(void *state, const drape_state *in, drape_st
     info->h = t - in->t;
     info->reason = DRAPE_REASON_CONVERGED;
     /* The work, by the trapezoidal rule. */
-    double after[2];
+    double *before = s->powers[0], *after = s->powers[1];
+    const size_t works = drape_system_work_count(s->system);
     measure_powers(s, out->t, after);
-    info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
-    info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
-    memcpy(s->powers, after, sizeof after);
+    for (size_t i = 0; i < works; i++)
+        drape_system_work(s->system)[i] = 0.5 * (out->t - in->t) * (before[i] + after[i]);
+    info->dissipated = 0.5 * (out->t - in->t) * (before[works] + after[works]);
+    s->powers[0] = after;
+    s->powers[1] = before;
     status = drape_system_agree(s->system);
     if (status)
         return status;
@@ -512,6 +516,8 @@ drape_status drape_first_order_create(const drape_first_order_solver *solver, dr
         s->mass[i] = s->model->mass[s->model->node_of_free[i / 3]];
     for (int k = 0; s->ranks && k < 2; k++)
         s->with_copies[k] = drape_arena_take(s->arena, (size_t)s->model->block_count, 3 * sizeof(double));
+    for (int k = 0; k < 2; k++)
+        s->powers[k] = drape_arena_take(s->arena, drape_system_work_count(s->system) + 1, sizeof(double));
     if (s->model->has_dissipation)
         s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
     drape_reserve reserve = {.used = false};
@@ -610,7 +616,7 @@ void drape_first_order_archive(void *state, drape_archive *a)
     drape_archive_double(a, &s->reached);
     drape_archive_double(a, &s->from);
     drape_sun_newton_archive(&s->newton, a);
-    drape_archive_doubles(a, s->powers, 2);
+    drape_archive_doubles(a, s->powers[0], drape_system_work_count(s->system) + 1);
     drape_archive_double(a, &s->second);
     drape_archive_int64(a, &s->tiny);
     drape_archive_int64(a, &s->steps);

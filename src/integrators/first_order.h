@@ -142,7 +142,8 @@ struct drape_first_order {
     double span[2];         /* [s] interval without a kink in the motion of pins and colliders */
     double reached;         /* [s] time of the library's state; NAN: it must restart */
     double from;            /* [s] time at which the last successful step began; NAN: none */
-    double powers[2];       /* [W] power of dissipation; power of pins; both at the time reached */
+    double *powers[2];      /* [W] of what does work (drape_system_work_count), then that of dissipation, at
+                               the time reached; scratch */
     double second;          /* [s] beginning of the second of simulated time in which steps are counted */
     double size, speed;     /* [m], [m/s]: of the scene, by which time is measured */
     int64_t tiny;           /* tiny steps in a row: drape_step_moves */

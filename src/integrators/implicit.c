@@ -277,22 +277,11 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
     return drape_ranks_sum(s->equation.ranks, work);
 }
 
-/* Adds the work of forces (nodes) on a path. */
-static void add_work(const drape_step_equation *e, const double *g, const double *from, const double *to,
-                     double *sum)
-{
-    double work = e->ranks ? 0 : *sum;
-    for (size_t i = 0; i < e->nodes; i++)
-        if (drape_model_owns(e->model, (int32_t)(i / 3)))
-            work += g[i] * (to[i] - from[i]);
-    *sum = e->ranks ? *sum + drape_ranks_sum(e->ranks, work) : work;
-}
-
 void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,
                           drape_step_info *info)
 {
     drape_step_equation *e = &s->equation;
-    double pin_work = 0;
+    double pin_work = 0, *work = drape_system_work(e->system);
     for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
@@ -301,14 +290,13 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
         }
     pin_work = drape_ranks_sum(e->ranks, pin_work);
     pin_work += drape_system_support_work(e->system, NULL, in->t, out->t);
-    info->pin_work += pin_work + drape_implicit_collider_work(s, in->t, out->t);
+    work[DRAPE_BY_PINS] += pin_work;
+    work[DRAPE_BY_COLLIDERS] += drape_implicit_collider_work(s, in->t, out->t);
     info->residual_work += fmax(drape_step_equation_dot(e, e->f, s->d), 0);
     if (!s->dissipated)
         return;
     /* From here on the forces on colliders, whose work was added above, are their dissipative part. */
-    drape_system_dissipation(e->system, &e->point, s->dissipated);
-    add_work(e, s->dissipated, in->x, out->x, &info->dissipated);
-    info->dissipated += drape_system_support_work(e->system, s->dissipated, in->t, out->t);
+    info->dissipated += drape_system_dissipation(e->system, &e->point, out->t - in->t, s->dissipated);
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
 
@@ -332,15 +320,16 @@ void drape_implicit_audit_stage(drape_implicit *s, const double *from, const dou
 {
     drape_step_equation *e = &s->equation;
     const drape_point middle = middle_of(e, from, to, t, span);
+    double *work = drape_system_work(e->system);
     if (drape_system_is_driven(e->system))
         drape_system_force(e->system, &middle, g);
-    info->pin_work += drape_system_support_work(e->system, NULL, t, t + span);
-    info->pin_work += drape_implicit_collider_work(s, t, t + span);
+    work[DRAPE_BY_PINS] += drape_system_support_work(e->system, NULL, t, t + span);
+    work[DRAPE_BY_COLLIDERS] += drape_implicit_collider_work(s, t, t + span);
     for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)s->motion->moved_node[i] + k;
             const double gained = s->momentum[0] ? s->momentum[1][at] - s->momentum[0][at] : 0;
-            info->pin_work += (g[at] + gained / span) * (to[at] - from[at]);
+            work[DRAPE_BY_PINS] += (g[at] + gained / span) * (to[at] - from[at]);
         }
     drape_implicit_audit_dissipation(s, from, to, t, span, info);
 }
@@ -352,9 +341,7 @@ void drape_implicit_audit_dissipation(drape_implicit *s, const double *from, con
     if (!s->dissipated)
         return;
     const drape_point middle = middle_of(e, from, to, t, span);
-    drape_system_dissipation(e->system, &middle, s->dissipated);
-    add_work(e, s->dissipated, from, to, &info->dissipated);
-    info->dissipated += drape_system_support_work(e->system, s->dissipated, t, t + span);
+    info->dissipated += drape_system_dissipation(e->system, &middle, span, s->dissipated);
     info->dissipated += drape_implicit_collider_work(s, t, t + span);
 }
 

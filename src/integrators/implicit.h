@@ -110,10 +110,10 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
  * drape_system_force all forces, after drape_system_dissipation their dissipative part. 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Adds to info the work over a step of dissipative forces on all nodes, of moved pins against g, and of the
- * residual, all where the equation was evaluated last: for methods that evaluate forces at one point of a
- * step only, that of their equation. The force that accelerates the pinned nodes' own mass does no work on
- * the cloth. */
+/* Adds to info the work over a step of dissipative forces on all nodes and of the residual, and to that of
+ * the system the work of moved pins against g, of colliders and of terms, all where the equation was
+ * evaluated last: for methods that evaluate forces at one point of a step only, that of their equation. The
+ * force that accelerates the pinned nodes' own mass does no work on the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 
@@ -126,7 +126,7 @@ void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const
  * equation and g (nodes). */
 void drape_implicit_audit_stage(drape_implicit *implicit, const double *from, const double *to, double t,
                                 double span, double *g, drape_step_info *info);
-/* The part of it that is dissipated. */
+/* The part of it that is dissipated, or done by terms. */
 void drape_implicit_audit_dissipation(drape_implicit *implicit, const double *from, const double *to,
                                       double t, double span, drape_step_info *info);
 

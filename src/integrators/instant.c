@@ -27,32 +27,28 @@ void drape_instant_diagnose(drape_system *system, const double *x, const double 
     drape_system_check(system, x, NULL, internal, &info->reason, &info->diagnostic);
 }
 
-/* Of the forces that were evaluated last, or of g, on colliders and supports. */
-static double power_of_bodies(const drape_system *system, const drape_point *point, const double *g)
+static double power_of_colliders(const drape_system *system, const drape_point *point)
 {
-    const double middle = middle_of(point->span);
-    return drape_system_support_power(system, g, middle) +
-           drape_motion_collider_power(drape_system_motion(system), drape_system_on_colliders(system),
-                                       point->t, middle);
+    return drape_motion_collider_power(drape_system_motion(system), drape_system_on_colliders(system),
+                                       point->t, middle_of(point->span));
 }
 
-double drape_instant_dissipation(drape_system *system, const drape_point *point, double *g)
+double drape_instant_dissipation(drape_system *system, const drape_point *point, double time, double *g)
 {
-    const drape_model *m = drape_system_model(system);
-    drape_system_dissipation(system, point, g);
-    double power = power_of_bodies(system, point, g);
-    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-        power += drape_model_owns(m, (int32_t)(i / 3)) ? g[i] * point->v[i] : 0;
-    return power;
+    const double work = drape_system_dissipation(system, point, time, g);
+    return work + time * drape_ranks_sum(drape_model_ranks(drape_system_model(system)),
+                                         power_of_colliders(system, point));
 }
 
-double drape_instant_driving(const drape_system *system, const drape_point *point, const double *g)
+void drape_instant_driving(const drape_system *system, const drape_point *point, const double *g, double time,
+                           double *work)
 {
     const drape_motion *motion = drape_system_motion(system);
-    double power = power_of_bodies(system, point, NULL);
+    double power = drape_system_support_power(system, NULL, middle_of(point->span));
     for (int32_t i = 0; i < motion->moved_count; i++)
         for (size_t k = 0, at = 3 * (size_t)motion->moved_node[i]; k < 3; k++)
             if (drape_model_owns(drape_system_model(system), motion->moved_node[i]))
                 power += g[at + k] * point->v[at + k];
-    return power;
+    work[DRAPE_BY_PINS] += time * power;
+    work[DRAPE_BY_COLLIDERS] += time * power_of_colliders(system, point);
 }

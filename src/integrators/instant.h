@@ -17,12 +17,13 @@ void drape_instant_place_pins(const drape_motion *motion, double t, const double
 void drape_instant_diagnose(drape_system *system, const double *x, const double *internal, const double *g,
                             double *scratch, drape_step_info *info);
 
-/* The power of dissipative forces at a point with its span, which are written to g (nodes), on its cloth
- * and on colliders and supports that move [W]. Of a rank's part of the model, that part of it. */
-double drape_instant_dissipation(drape_system *system, const drape_point *point, double *g);
+/* drape_system_dissipation with the work on colliders. */
+double drape_instant_dissipation(drape_system *system, const drape_point *point, double time, double *g);
 
-/* The power of what moves pins, supports and colliders against the forces g (nodes) at a point with its
- * span, where they were the last that were evaluated [W]. Of a rank's part of the model, that part of it. */
-double drape_instant_driving(const drape_system *system, const drape_point *point, const double *g);
+/* Adds the work over a time [s] of what moves pins, supports and colliders against the forces g (nodes) at a
+ * point with its span, where they were the last that were evaluated, to work, at DRAPE_BY_PINS and
+ * DRAPE_BY_COLLIDERS. Of a rank's part of the model, that part of it. */
+void drape_instant_driving(const drape_system *system, const drape_point *point, const double *g, double time,
+                           double *work);
 
 #endif

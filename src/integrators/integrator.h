@@ -25,9 +25,8 @@ typedef struct drape_step_info {
     bool solved, by_error;  /* see drape_solve_report */
     double further_seconds; /* [s] spent on work beyond the least, which set_deadline limits */
     bool lenient, usable;   /* see drape_solve_report */
-    double dissipated;      /* [J] work of dissipative terms in this step */
-    double pin_work;        /* [J] work of moving pins */
-    double law_work;        /* [J] of that: by laws of contact that changed within the step */
+    double dissipated;      /* [J] work of dissipative terms in this step; drape_system_work has the others */
+    double law_work;        /* [J] of that of colliders: by laws of contact that changed within the step */
     double open_work;       /* [J] by how much that of changing loads may be wrong; set by the sim */
     double residual_work;   /* [J] of the residual that is left, F d with the displacement d; 0 if negative */
     bool committed;         /* out->internal is set, and its elements were checked during the step */

@@ -585,16 +585,16 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         status = attempt(s, &a, info);
     if (status)
         return status;
-    /* The work of dissipative forces, pins and colliders; the end of the step is left in s->x and s->v. */
+    /* The work; the end of the step is left in s->x and s->v. */
     for (int i = 0; i < STAGES; i++) {
         const double time = i == STAGES - 1 ? a.t1 : s->span[0] + fraction[i] * a.h;
         const drape_point point = place(s, time, s->next.x, s->z[i], s->rate[i]);
         const double weight = quadrature[i] * a.h;
         if (s->dissipated)
-            info->dissipated += weight * drape_instant_dissipation(s->system, &point, s->dissipated);
+            info->dissipated += drape_instant_dissipation(s->system, &point, weight, s->dissipated);
         if (drape_system_is_driven(s->system)) {
             drape_system_force(s->system, &point, s->g);
-            info->pin_work += weight * drape_instant_driving(s->system, &point, s->g);
+            drape_instant_driving(s->system, &point, s->g, weight, drape_system_work(s->system));
         }
     }
     memcpy(out->x, s->x, nodes * sizeof *out->x);

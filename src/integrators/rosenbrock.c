@@ -34,6 +34,8 @@ enum { PARAM_LINEAR_SOLVER = DRAPE_LOCAL_ERROR_PARAM_COUNT, PARAM_COUNT };
 /* Of the stages, which are short beside positions: the step along them for the derivative of the power. */
 #define ALONG 1e-6
 
+#define DRIVERS DRAPE_BY_HOST /* pins and colliders, which come first */
+
 /* RODAS of order 4 with an embedded solution of order 3, Hairer & Wanner 1996, VI.4. Of order 3, RODAS3
  * (Sandu et al. 1997) and ROS34PW2 (Rang & Angermann 2005) took about as long for an error of 1e-3 of the
  * size of a sheet, and 1.2 to 2 times as long for 1e-4 and less. */
@@ -77,8 +79,8 @@ typedef struct rosenbrock_state {
     double *change;                                                    /* free DOFs: g_t [N/s] */
     double *rx, *right;                                                /* free DOFs: of the present stage */
     bool moved;                                                        /* g depends on t */
-    double start_power;                                                /* [W] P at the start of the step */
-    double power; /* [W] sum b_i P_i of the stages so far */
+    double start_power[DRIVERS];                                       /* [W] P at the start of the step */
+    double power[DRIVERS]; /* [W] sum b_i P_i of the stages so far */
 } rosenbrock_state;
 
 /* ---- Work ----
@@ -89,10 +91,10 @@ typedef struct rosenbrock_state {
  * so only one derivative along one direction is needed. Sums of powers at the ends of a step would count the
  * force of a dashpot at a jump of a pin's velocity for a large part of the step. */
 
-/* P where the forces g were evaluated last. */
-static double power(const rosenbrock_state *s, const double *g)
+/* Adds P where the forces g were evaluated last, times a factor. */
+static void add_power(const rosenbrock_state *s, const double *g, double factor, double *to)
 {
-    return drape_instant_driving(s->common.equation.system, &s->common.equation.point, g);
+    drape_instant_driving(s->common.equation.system, &s->common.equation.point, g, factor, to);
 }
 
 /* ---- Forces ---- */
@@ -137,9 +139,10 @@ static drape_status evaluate_start(rosenbrock_state *s, const drape_state *in, d
     for (size_t i = 0; i < e->dofs; i++)
         e->v[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
     place_pins(s, in->t);
+    memset(s->start_power, 0, sizeof s->start_power);
     const drape_status status = evaluate(s, in->t, s->g0, info);
     if (!status)
-        s->start_power = power(s, s->g0);
+        add_power(s, s->g0, 1, s->start_power);
     return status;
 }
 
@@ -216,14 +219,15 @@ static drape_status stage_forces(rosenbrock_state *s, const drape_state *in, dou
     move_to(s, in, scheme->a[i], i, t);
     *g = scheme->alpha[i] == 0 ? s->g0 : e->g;
     if (*g == s->g0) {
-        s->power += scheme->b[i] * s->start_power;
+        for (int k = 0; k < DRIVERS; k++)
+            s->power[k] += scheme->b[i] * s->start_power[k];
         return DRAPE_OK;
     }
     if (drape_system_crosses(e->system, e->x, t, &info->reason, &info->diagnostic))
         return DRAPE_RETRY_REJECTED;
     const drape_status status = evaluate(s, t, e->g, info);
     if (!status)
-        s->power += scheme->b[i] * power(s, e->g);
+        add_power(s, e->g, scheme->b[i], s->power);
     return status;
 }
 
@@ -313,9 +317,11 @@ static drape_status add_moved(rosenbrock_state *s, const drape_state *in, double
     }
     move_to(s, in, weights, alone ? 0 : scheme->stages, in->t + ahead);
     const drape_status status = evaluate(s, in->t + ahead, s->common.equation.g, info);
+    double powers[DRIVERS] = {0}, *work = drape_system_work(s->common.equation.system);
     if (!status)
-        info->pin_work += h * (alone ? power(s, s->common.equation.g)
-                                     : s->power + (power(s, s->common.equation.g) - s->start_power) / ALONG);
+        add_power(s, s->common.equation.g, 1, powers);
+    for (int k = 0; k < DRIVERS && !status; k++)
+        work[k] += h * (alone ? powers[k] : s->power[k] + (powers[k] - s->start_power[k]) / ALONG);
     return status;
 }
 
@@ -332,7 +338,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = evaluate_start(s, in, attempt.stop, info);
     if (!status)
         status = drape_local_error_begin(&s->control, in, s->g0, &attempt, info);
-    s->power = 0;
+    memset(s->power, 0, sizeof s->power);
     if (!status && e->dofs > 0) {
         /* What the forces depend on besides the state of the free nodes. */
         const drape_motion *m = s->common.motion;

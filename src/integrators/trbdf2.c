@@ -130,7 +130,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         status = differentiate(s, in, h, w, out, info);
     if (!s->hits)
         return status;
-    info->pin_work = before.pin_work;
+    drape_system_begin_work(c->equation.system);
     info->dissipated = before.dissipated;
     return drape_implicit_euler(c, in, out, h, info);
 }

@@ -200,23 +200,19 @@ static void evaluate(verlet_state *s, const substep *sub, double share, double t
         g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
-    sub->info->pin_work += share * sub->h * drape_verlet_friction(&s->contact, t, sub->x, v, g);
+    drape_system_work(s->system)[DRAPE_BY_COLLIDERS] +=
+        share * sub->h * drape_verlet_friction(&s->contact, t, sub->x, v, g);
 }
 
 /* Adds the work of the dissipative forces at x, v and t over a share of the substep. */
 static void audit_dissipation(verlet_state *s, const substep *sub, double share, double t, const double *v)
 {
-    double power = 0;
-    if (!s->dissipated)
-        return;
-    drape_system_dissipation(
-        s->system,
-        &(drape_point){
-            .x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}, .turning = true},
-        s->dissipated);
-    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
-        power += s->dissipated[i] * v[i];
-    sub->info->dissipated += share * sub->h * power;
+    if (s->dissipated)
+        sub->info->dissipated += drape_system_dissipation(
+            s->system,
+            &(drape_point){
+                .x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}, .turning = true},
+            share * sub->h, s->dissipated);
 }
 
 /* ---- The stages of a substep ---- */
@@ -247,12 +243,13 @@ static void start_pins(verlet_state *s, const substep *sub)
 static void audit_pins(verlet_state *s, const substep *sub, const double *g, double share)
 {
     const drape_motion *m = s->motion;
+    double *work = &drape_system_work(s->system)[DRAPE_BY_PINS];
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + k;
-            sub->info->pin_work += share * g[at] * sub->v[at] * sub->h;
+            *work += share * g[at] * sub->v[at] * sub->h;
         }
-    sub->info->pin_work += share * drape_system_support_work(s->system, NULL, sub->t0, sub->t);
+    *work += share * drape_system_support_work(s->system, NULL, sub->t0, sub->t);
 }
 
 static void damp(verlet_state *s, const substep *sub)
@@ -311,7 +308,8 @@ static void project(verlet_state *s, const substep *sub)
     double start = drape_clock_seconds();
     if (m->contact.self)
         drape_verlet_self_push(&s->self, sub->share, sub->x);
-    sub->info->pin_work += drape_verlet_project(&s->contact, sub->t0, sub->t, sub->h, s->x0, sub->x);
+    drape_system_work(s->system)[DRAPE_BY_COLLIDERS] +=
+        drape_verlet_project(&s->contact, sub->t0, sub->t, sub->h, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
     if (m->supports_move || m->image_set_count > 0)

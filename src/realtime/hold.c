@@ -79,7 +79,7 @@ static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info
     if (!status)
         status = drape_room_let_in(contact, next->x, t1);
     drape_sim_add_contact_work(sim);
-    const drape_energy before = drape_sim_energy(sim);
+    const drape_energy before = drape_sim_account(sim);
     if (!status)
         status = drape_system_check_contact(sim->system, next->x, t1, &info->reason, &info->diagnostic);
     if (!status)
@@ -90,7 +90,10 @@ static drape_status make_step(drape_sim *sim, drape_state *next, drape_step_info
     if (status)
         return status;
     const drape_energy after = drape_sim_energy_of(sim, t1, next->x, next->v);
-    info->pin_work = potential(&after) - potential(&before) + fmax(0, after.kinetic - before.kinetic);
+    const bool pins = drape_system_motion(sim->system)->moved_count > 0;
+    drape_system_begin_work(sim->system);
+    drape_system_work(sim->system)[pins ? DRAPE_BY_PINS : DRAPE_BY_COLLIDERS] =
+        potential(&after) - potential(&before) + fmax(0, after.kinetic - before.kinetic);
     return DRAPE_OK;
 }
 

@@ -1,7 +1,8 @@
 /*
  * audit.c: the energy account of a run. Kinetic, elastic and gravitational energy are functions of the
- * state; the integrators sum what damping terms dissipated and the work of moving pins over accepted steps;
- * the remainder is the numerical dissipation of the integrator.
+ * state; the integrators sum what damping terms dissipated and the work of pins, colliders and loads over
+ * accepted steps; the remainder is the numerical dissipation of the integrator. Loads with a potential have
+ * it in `gravity` here: it is available to the motion.
  *
  * Kinetic energy is that of the free nodes. The motion of pinned nodes is prescribed: the energy that
  * accelerates them is not part of the account. For a pin that jumps it would be so large that everything
@@ -12,6 +13,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 /* In an explosion, kinetic energy grows by more than JUMP, and more than SHARE of it has no known source. */
 #define JUMP  4.0 /* factor of the kinetic energy in one step */
@@ -66,12 +68,12 @@ static drape_energy measure_at(const drape_sim *sim, const drape_point *point)
 }
 
 static drape_energy measure(const drape_sim *sim, const drape_state *state, const double *internal,
-                            double dissipated, double pin_work)
+                            double dissipated, double work)
 {
     drape_energy e =
         measure_at(sim, &(drape_point){.x = state->x, .v = state->v, .internal = internal, .t = state->t});
     e.dissipated = dissipated;
-    e.numerical = sim->audit.start + pin_work - dissipated - (e.kinetic + e.elastic + e.gravity + e.contact);
+    e.numerical = sim->audit.start + work - dissipated - (e.kinetic + e.elastic + e.gravity + e.contact);
     return e;
 }
 
@@ -81,15 +83,40 @@ drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x
                       &(drape_point){.x = x, .v = v, .internal = drape_sim_state(sim)->internal, .t = t});
 }
 
+/* The work of all so far, or in a step; or that of terms that have no energy, such as wind. */
+static double sum_work(const drape_sim *sim, const double *work, bool driven)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < DRAPE_BY_TERMS + sim->model->term_count; i++)
+        if (!driven || (i >= DRAPE_BY_TERMS && sim->model->terms[i - DRAPE_BY_TERMS].ops->dissipation))
+            sum += work[i];
+    return sum;
+}
+
+static double step_work(const drape_sim *sim, bool driven)
+{
+    return sum_work(sim, drape_system_work(sim->system), driven);
+}
+
+drape_energy drape_sim_account(drape_sim *sim)
+{
+    const drape_state *state = drape_sim_state(sim);
+    if (!sim->energy_known)
+        sim->energy =
+            measure(sim, state, state->internal, sim->audit.dissipated, sum_work(sim, sim->work, false));
+    sim->energy_known = !isnan(sim->energy.contact);
+    return sim->energy;
+}
+
 drape_energy drape_sim_energy(drape_sim *sim)
 {
     if (!sim)
         return (drape_energy){0};
+    drape_energy e = drape_sim_account(sim);
     const drape_state *state = drape_sim_state(sim);
-    if (!sim->energy_known)
-        sim->energy = measure(sim, state, state->internal, sim->audit.dissipated, sim->audit.pin_work);
-    sim->energy_known = !isnan(sim->energy.contact);
-    return sim->energy;
+    const drape_point point = {.x = state->x, .internal = state->internal, .t = state->t};
+    e.gravity -= drape_system_measure_loads(sim->system, &point, sim->potential);
+    return e;
 }
 
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density)
@@ -120,20 +147,22 @@ void drape_sim_reset_energy(drape_sim *sim)
     const double known = sim->audit.offered + sim->audit.start_gravity - sim->audit.lowest;
     sim->audit = (drape_audit){0};
     sim->energy_known = false;
-    const drape_energy e = drape_sim_energy(sim);
-    sim->audit.start = sum_of(&e);
+    const drape_energy e = drape_sim_account(sim);
+    sim->audit.start_weight = drape_sim_energy(sim).gravity;
+    memcpy(sim->work, sim->potential, drape_system_work_count(sim->system) * sizeof *sim->work);
+    sim->audit.start = sum_of(&e) - sum_work(sim, sim->work, false);
     sim->audit.offered = fmax(known, e.kinetic + fabs(e.elastic) + fabs(e.contact));
     sim->audit.start_gravity = sim->audit.lowest = e.gravity;
     sim->energy_known = false;
 }
 
-void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before)
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before, int worker)
 {
     drape_audit *audit = &sim->audit;
     sim->energy_known = sim->attempted_known = false;
-    const drape_energy now = drape_sim_energy(sim);
+    const drape_energy now = drape_sim_account(sim);
     const double given = sum_of(&now) - sum_of(before), lifted = now.gravity - before->gravity;
-    audit->start += given;
+    sim->work[worker] += given;
     audit->start_gravity += lifted;
     audit->lowest += lifted;
     audit->offered += fmax(given - lifted, 0);
@@ -155,7 +184,10 @@ static double scene_energy(const drape_model *m)
 double drape_sim_energy_received(drape_sim *sim)
 {
     const drape_energy e = drape_sim_energy(sim);
-    const double sum = e.kinetic + e.elastic + e.contact + e.numerical + fmax(e.dissipated, 0);
+    double work, sum = e.kinetic + e.elastic + e.contact + e.numerical + fmax(e.dissipated, 0) +
+                       fmax(e.gravity - sim->audit.start_weight, 0);
+    for (int i = 0; drape_sim_work(sim, i, &work); i++)
+        sum += fmax(-work, 0);
     return sum > AT_REST * scene_energy(sim->model) ? sum : 0;
 }
 
@@ -210,25 +242,29 @@ static bool exploded(const drape_energy *e, const drape_energy *attempted, doubl
 /* The energy available to the run so far: the initial energy, the largest fall in gravity, the work of pins
  * and damping (whose sums have errors of their own), and, for starts at rest, the energy of the scene's
  * mass at the scene's speed. */
-static double offered(const drape_audit *audit, const drape_energy *attempted, const drape_step_info *info,
+static double offered(const drape_sim *sim, const drape_energy *attempted, const drape_step_info *info,
                       double quiet)
 {
-    return audit->offered + fabs(info->pin_work) + fabs(info->dissipated) + audit->start_gravity -
+    const drape_audit *audit = &sim->audit;
+    return audit->offered + fabs(step_work(sim, false)) + fabs(info->dissipated) + audit->start_gravity -
            fmin(audit->lowest, attempted->gravity) + quiet;
+}
+
+static drape_energy attempt(const drape_sim *sim, const drape_state *out, const drape_step_info *info)
+{
+    return measure(sim, out, drape_sim_state(sim)->internal, sim->audit.dissipated + info->dissipated,
+                   sum_work(sim, sim->work, false) + step_work(sim, false));
 }
 
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info)
 {
     const drape_model *m = sim->model;
     const drape_audit *audit = &sim->audit;
-    const drape_energy e = drape_sim_energy(sim);
-    const drape_energy attempted = sim->attempted_known ? sim->attempted
-                                                        : measure(sim, out, drape_sim_state(sim)->internal,
-                                                                  audit->dissipated + info->dissipated,
-                                                                  audit->pin_work + info->pin_work);
+    const drape_energy e = drape_sim_account(sim);
+    const drape_energy attempted = sim->attempted_known ? sim->attempted : attempt(sim, out, info);
     const double max_gain = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
     const double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
-                 scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical,
+                 scale = offered(sim, &attempted, info, quiet), run = audit->best - attempted.numerical,
                  unexplained = audit->best_unexplained - attempted.numerical - audit->residual_work -
                                info->residual_work;
     sim->attempted = attempted;
@@ -316,26 +352,27 @@ static double take_back(const drape_model *m, double energy, double *v)
 void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *info)
 {
     const drape_audit *audit = &sim->audit;
-    const double left = audit->residual_work + info->residual_work, before = drape_sim_energy(sim).numerical;
-    const bool summed = sim->chosen.integrator->own_steps && info->dissipated > 0;
+    const double left = audit->residual_work + info->residual_work, before = drape_sim_account(sim).numerical;
+    const double most = fmin(info->dissipated, info->dissipated - step_work(sim, true));
+    const bool summed = sim->chosen.integrator->own_steps && most > 0;
     if (!(left > 0 || summed) || drape_model_all_free(sim->model) == 0)
         return;
-    drape_energy e = measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
-                             audit->pin_work + info->pin_work);
+    drape_energy e = attempt(sim, out, info);
     if (sim->rescue && sim->rescue->takes_any(sim)) {
-        const double taken =
-            take_back(sim->model, fmin(audit->most_lost - e.numerical - e.dissipated, left), out->v);
+        const double lost =
+                         e.numerical + e.dissipated - sum_work(sim, sim->work, true) - step_work(sim, true),
+                     taken = take_back(sim->model, fmin(audit->most_lost - lost, left), out->v);
         e.kinetic -= taken;
         e.numerical += taken;
     }
     /* of a step that is solved to its tolerance, what is dissipated is what the method says */
     const bool solved = info->residual <= info->tolerance;
     const double gained = before - e.numerical,
-                 driven = fmin(solved ? fmin(gained, info->residual_work) : gained, info->dissipated);
-    if (driven > 0) {
-        info->dissipated -= driven;
-        e.dissipated -= driven;
-        e.numerical += driven;
+                 never = fmin(solved ? fmin(gained, info->residual_work) : gained, most);
+    if (never > 0) {
+        info->dissipated -= never;
+        e.dissipated -= never;
+        e.numerical += never;
     }
     sim->attempted = e;
     sim->attempted_known = true;
@@ -344,7 +381,7 @@ void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *in
 void drape_sim_add_contact_work(drape_sim *sim)
 {
     const double work = drape_system_take_contact_work(sim->system);
-    sim->audit.pin_work += work;
+    sim->work[DRAPE_BY_COLLIDERS] += work;
     sim->audit.offered += fmax(work, 0);
     sim->energy.contact += work;
 }
@@ -362,9 +399,10 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
 {
     drape_audit *audit = &sim->audit;
     audit->dissipated += info->dissipated;
-    audit->pin_work += info->pin_work;
+    for (size_t i = 0; i < drape_system_work_count(sim->system); i++)
+        sim->work[i] += drape_system_work(sim->system)[i];
     audit->residual_work += info->residual_work;
-    audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
+    audit->offered += fabs(step_work(sim, false)) + fabs(info->dissipated);
     /* with internal variables, committing the step changes the energy */
     sim->energy_known = sim->attempted_known && drape_model_whole(sim->model)->internal_count == 0;
     if (!sim->attempted_known)
@@ -373,6 +411,7 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     sim->attempted_known = false;
     audit->lowest = fmin(audit->lowest, sim->attempted.gravity);
     audit->best = fmax(audit->best, sim->attempted.numerical);
-    audit->most_lost = fmax(audit->most_lost, sim->attempted.numerical + sim->attempted.dissipated);
+    audit->most_lost = fmax(audit->most_lost, sim->attempted.numerical + sim->attempted.dissipated -
+                                                  sum_work(sim, sim->work, true));
     audit->best_unexplained = fmax(audit->best_unexplained, sim->attempted.numerical + audit->residual_work);
 }

@@ -81,13 +81,14 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
 static void archive_audit(drape_sim *sim, drape_archive *a)
 {
     drape_audit *audit = &sim->audit;
-    double *const sums[] = {&audit->start,    &audit->start_gravity, &audit->dissipated,
-                            &audit->pin_work, &audit->offered,       &audit->lowest,
-                            &audit->best,     &audit->residual_work, &audit->best_unexplained,
+    double *const sums[] = {&audit->start,        &audit->start_gravity, &audit->dissipated,
+                            &audit->start_weight, &audit->offered,       &audit->lowest,
+                            &audit->best,         &audit->residual_work, &audit->best_unexplained,
                             &audit->most_lost};
     drape_archive_mark(a, "audit");
     for (size_t i = 0; i < sizeof sums / sizeof *sums; i++)
         drape_archive_double(a, sums[i]);
+    drape_archive_doubles(a, sim->work, drape_system_work_count(sim->system));
     drape_archive_bool(a, &sim->energy_known);
     double *const parts[] = {&sim->energy.kinetic, &sim->energy.elastic,    &sim->energy.gravity,
                              &sim->energy.contact, &sim->energy.dissipated, &sim->energy.numerical};

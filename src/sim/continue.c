@@ -113,15 +113,32 @@ static drape_status measured(drape_sim *sim)
     return DRAPE_E_MEMORY;
 }
 
+/* What has the same name goes on; the work of the rest is forgotten, without a change of the balance. */
+static void continue_work(drape_sim *to, drape_sim *from)
+{
+    const char *name, *other;
+    double work;
+    drape_sim_energy(to);
+    for (size_t i = 0; i < drape_system_work_count(from->system); i++)
+        to->audit.start += from->work[i];
+    for (size_t i = 0; i < drape_system_work_count(to->system); i++) {
+        to->work[i] = to->potential[i];
+        for (int k = 0; (name = to->workers[i]) && (other = drape_sim_work(from, k, &work)); k++)
+            to->work[i] += strcmp(name, other) == 0 ? work : 0;
+        to->audit.start -= to->work[i];
+    }
+}
+
 /* The energy account goes on; what the change itself adds or takes counts as given by the host. */
 static drape_status copy_account(drape_sim *to, drape_sim *from)
 {
-    const drape_energy before = drape_sim_energy(from);
+    const drape_energy before = drape_sim_account(from);
     const drape_status status = measured(from);
     if (status)
         return status;
     to->audit = from->audit;
-    drape_sim_shift_energy(to, &before);
+    continue_work(to, from);
+    drape_sim_shift_energy(to, &before, DRAPE_BY_HOST);
     return measured(to);
 }
 

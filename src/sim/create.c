@@ -112,6 +112,8 @@ static drape_status start_sim(drape_sim *sim, int threads)
     status = agree(sim, status);
     if (!status)
         status = create_system(sim, threads);
+    if (!status)
+        status = drape_sim_create_work(sim);
     if (!status) {
         /* Pins that bodies carry have the velocity of the body at the start, which frames of the first
          * step show. Those with a track of their own begin at rest, and jump to its velocity. */

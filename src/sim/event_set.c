@@ -52,8 +52,12 @@ static moment between(drape_sim *sim, const drape_state *next, double t)
 
 static const drape_energy *energy_of(moment *m)
 {
-    if (!m->has_energy)
+    if (!m->has_energy) {
         m->energy = drape_sim_energy_of(m->sim, m->t, m->x, m->v);
+        m->energy.gravity -= drape_system_measure_loads(
+            m->sim->system,
+            &(drape_point){.x = m->x, .internal = drape_sim_state(m->sim)->internal, .t = m->t}, NULL);
+    }
     m->has_energy = true;
     return &m->energy;
 }

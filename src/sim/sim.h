@@ -21,12 +21,13 @@ typedef struct drape_reason_total {
 /* The energy account of a run [J], kept over accepted steps. */
 typedef struct drape_audit {
     double start, start_gravity; /* energies of the first state */
-    double dissipated, pin_work; /* so far */
+    double start_weight;         /* of that of gravity, without the potential of loads */
+    double dissipated;           /* so far */
     double offered;              /* energy at the start plus the magnitudes of all work */
     double lowest;               /* lowest energy of gravity so far */
     double best;                 /* largest numerical dissipation so far */
     double residual_work;        /* of the residuals that unconverged steps left, so far */
-    double most_lost;            /* the same with what was dissipated: all that the motion has lost */
+    double most_lost;            /* the same with what was dissipated and what wind took: all that was lost */
     double best_unexplained;     /* largest numerical dissipation with that work as a source */
 } drape_audit;
 
@@ -84,6 +85,10 @@ struct drape_sim {
     /* of the last attempt in this advance. Not archived: no advance needs an earlier one */
     drape_reason reason;
     drape_audit audit;
+    /* (drape_system_work_count) [J] the work so far, and of loads the potential at the start that they have
+     * lost since; these potentials at the last drape_sim_energy, not archived; scratch */
+    double *work, *potential, *work_scratch;
+    const char **workers;                   /* (drape_system_work_count) their names; NULL: it does none */
     const struct drape_rescue_ops *rescue;  /* of steps that fail (rescue.h); NULL: there is none */
     struct drape_realtime_memory *realtime; /* what rescue keeps, */
     drape_arena rescue_arena;               /* and its memory */
@@ -192,8 +197,14 @@ bool drape_sim_left_too_much(drape_sim *sim, const drape_state *out, drape_step_
  * never rises but by known work. */
 void drape_sim_settle_work(drape_sim *sim, drape_state *out, drape_step_info *info);
 
-/* The energies at positions and velocities (node_count x 3) at time t, with the internal variables of the
- * present state; `dissipated` and `numerical` are 0. */
+/* drape_sim_energy with the potentials of loads in `gravity`, as by them gains are judged. */
+drape_energy drape_sim_account(drape_sim *sim);
+
+/* Names what does work, before any is added. Errors: DRAPE_E_MEMORY. */
+drape_status drape_sim_create_work(drape_sim *sim);
+
+/* drape_sim_account at positions and velocities (node_count x 3) at time t, with the internal variables of
+ * the present state; `dissipated` and `numerical` are 0. */
 drape_energy drape_sim_energy_of(const drape_sim *sim, double t, const double *x, const double *v);
 
 /* The status of forces that were read: a pending request to cancel the next advance is not an error of
@@ -223,18 +234,18 @@ drape_status drape_sim_begin_reading(drape_sim *sim);
 /* Adds the work of an accepted step to the energy account. */
 void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);
 
-/* The energy [J] that went into the run so far, by gravity, at the start, by pins, colliders, hosts and
- * wind: all that became of it. Where wind gives more than damping takes, only their difference counts. 0:
- * so little that it is rounding of a scene at rest. */
+/* The energy [J] that went into the run so far: at the start, by the fall, and by each whose work is
+ * positive. It is all that became of it, with what was lifted and what the others took. 0: so little that it
+ * is rounding of a scene at rest. */
 double drape_sim_energy_received(drape_sim *sim);
 
 /* Starts the energy account from the present state. What was available to the run before is still: a state
  * that is set is no more suspicious than the same state that was reached. */
 void drape_sim_reset_energy(drape_sim *sim);
 
-/* Takes all that has changed since the energies `before` as given by the host, who placed cloth elsewhere:
- * numerical dissipation stays as it was, and what was available to the run still is. */
-void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before);
+/* Takes all that has changed since the account `before` as the work of one, such as the host who placed cloth
+ * elsewhere: numerical dissipation stays as it was, and what was available to the run still is. */
+void drape_sim_shift_energy(drape_sim *sim, const drape_energy *before, int worker);
 
 /* If the present state is badly distorted, a clause for a message that names its most distorted edge or
  * triangle; otherwise "". */

@@ -59,14 +59,14 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
                               &info->diagnostic);
 }
 
-/* The work from one state to another of what no integrator counts: the forces of the host, and terms that
- * depend on time, of which *open may be wrong. Adds what of it is dissipated. */
-static double outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *open,
-                         double *dissipated)
+/* Adds to work that from one state to another of what no integrator counts: the forces of the host, and terms
+ * that depend on time, of which *open may be wrong. Adds what of it is dissipated. */
+static void add_outer_work(const drape_sim *sim, const drape_state *from, const drape_state *to, double *work,
+                           double *open, double *dissipated)
 {
-    return drape_system_push_work(sim->system, from->x, to->x) +
-           drape_system_timed_work(sim->system, from, to, open,
-                                   sim->chosen.integrator->steady_state ? NULL : dissipated);
+    work[DRAPE_BY_HOST] += drape_system_push_work(sim->system, from->x, to->x);
+    drape_system_add_timed_work(sim->system, from, to, work, open,
+                                sim->chosen.integrator->steady_state ? NULL : dissipated);
 }
 
 /* Makes a step of the integrator, then moves the supported nodes exactly onto their supports. The kinetic
@@ -80,14 +80,15 @@ static drape_status integrate(drape_sim *sim, drape_state *next, double h, drape
     const drape_state *from = integrator->in_space ? now : drape_system_to_frame(sim->system, now);
     const drape_status status = integrator->step(sim->integrator, from, next, h, info);
     info->law_work = drape_system_take_contact_work(sim->system);
-    info->pin_work += info->law_work;
+    double *work = drape_system_work(sim->system);
+    work[DRAPE_BY_COLLIDERS] += info->law_work;
     drape_system_from_frame(sim->system, status && !info->usable ? NULL : next);
     if (status && !info->usable)
         return status;
     drape_supports_hold(motion, now->t, now->x, next->t, next->x);
     const double span[2] = {integrator->steady_state ? next->t : now->t, next->t};
     drape_supports_hold_velocity(motion, span, instant, next->v);
-    info->pin_work += drape_supports_kinetic(motion, next->v) - drape_supports_kinetic(motion, now->v);
+    work[DRAPE_BY_PINS] += drape_supports_kinetic(motion, next->v) - drape_supports_kinetic(motion, now->v);
     return status;
 }
 
@@ -96,6 +97,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_state *next = next_state(sim);
     next->t = t1;
     sim->attempted_known = false;
+    drape_system_begin_work(sim->system);
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     if (sim->rescue)
@@ -104,7 +106,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     drape_sim_add_contact_work(sim);
     if (drape_system_contact(sim->system) &&
         (sim->chosen.integrator->steady_state || !sim->chosen.integrator->own_steps))
-        drape_sim_energy(sim); /* for the check, or a rejection, while contact is where the step begins */
+        drape_sim_account(sim); /* for the check, or a rejection, while contact is where the step begins */
     if (!status)
         status = integrate(sim, next, h, info);
     if (sim->rescue)
@@ -114,7 +116,8 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
     if (status && !info->usable)
         return status;
     info->open_work = 0;
-    info->pin_work += outer_work(sim, drape_sim_state(sim), next, &info->open_work, &info->dissipated);
+    add_outer_work(sim, drape_sim_state(sim), next, drape_system_work(sim->system), &info->open_work,
+                   &info->dissipated);
     drape_status refused = check(sim, info);
     if (refused)
         info->usable = false;
@@ -221,7 +224,7 @@ static void reject(drape_sim *sim, const drape_step_info *info)
 {
     const drape_energy before = sim->energy;
     if (info->law_work != 0) /* the laws stay, and give the present state another energy */
-        drape_sim_shift_energy(sim, &before);
+        drape_sim_shift_energy(sim, &before, DRAPE_BY_COLLIDERS);
     if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
         sim->before = -1;
     sim->statistics.steps_rejected++;
@@ -236,8 +239,10 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     const drape_state *now = drape_sim_state(sim);
     drape_state *next = next_state(sim);
     const double t = sim->schedule.cut_end, share = (t - now->t) / (next->t - now->t);
-    double open = 0, lost = 0;
-    const double outer = outer_work(sim, now, next, &open, &lost);
+    const size_t count = drape_system_work_count(sim->system);
+    double open = 0, lost = 0, *work = drape_system_work(sim->system),
+           *outer = memset(sim->work_scratch, 0, count * sizeof *outer);
+    add_outer_work(sim, now, next, outer, &open, &lost);
     info->open_work = 0;
     if (!sim->chosen.integrator->interpolate_velocities)
         return false;
@@ -248,8 +253,9 @@ static bool cut_on_dense_output(drape_sim *sim, drape_step_info *info)
     next->t = t;
     info->h = t - now->t;
     info->dissipated = share * (info->dissipated - lost);
-    info->pin_work =
-        share * (info->pin_work - outer) + outer_work(sim, now, next, &info->open_work, &info->dissipated);
+    for (size_t i = 0; i < count; i++)
+        work[i] = share * (work[i] - outer[i]);
+    add_outer_work(sim, now, next, work, &info->open_work, &info->dissipated);
     return !check(sim, info);
 }
 

@@ -166,7 +166,7 @@ static void commit(drape_sim *sim)
 {
     const drape_model *m = sim->model;
     drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
-    const drape_energy before = drape_sim_energy(sim);
+    const drape_energy before = drape_sim_account(sim);
     next->t = now->t;
     memcpy(next->v, now->v, 3 * (size_t)m->node_count * sizeof *next->v);
     drape_state_commit(m, now, next);
@@ -174,7 +174,7 @@ static void commit(drape_sim *sim)
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);
     drape_sim_forget_past(sim);
-    drape_sim_shift_energy(sim, &before);
+    drape_sim_shift_energy(sim, &before, DRAPE_BY_HOST);
 }
 
 static drape_status untangle(drape_sim *sim, const drape_untangle_def *def, drape_untangling *u)

@@ -529,7 +529,7 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
         double power = 0, scale, spin[3] = {0.3, -1.1, 0.7};
         state s = make_state(ctx, model, seed, 0.01);
         s.point.history = NULL;
-        drape_system_dissipation(system, &s.point, s.g);
+        drape_system_dissipation(system, &s.point, 0, s.g);
         scale = largest(s.g, s.n);
         for (size_t i = 0; i < s.n; i++)
             power += s.g[i] * s.v[i];
@@ -537,7 +537,7 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
         for (size_t i = 0; i < s.n; i++) /* v = w x r + c */
             s.v[i] = spin[(i + 1) % 3] * s.x[i - i % 3 + (i + 2) % 3] -
                      spin[(i + 2) % 3] * s.x[i - i % 3 + (i + 1) % 3] + 0.5;
-        drape_system_dissipation(system, &s.point, s.g);
+        drape_system_dissipation(system, &s.point, 0, s.g);
         if (!v->ops->dissipation)
             ck_assert_msg(largest(s.g, s.n) <= 1e-13 * scale, "%s: %g N of %g", name_of(v), largest(s.g, s.n),
                           scale);

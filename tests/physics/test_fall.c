@@ -120,7 +120,8 @@ TEST(turning_cloth_does_not_feel_its_damping)
             const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
             v[3 * i + k] = omega * (u[k1] * x0[3 * i + k2] - u[k2] * x0[3 * i + k1]) + wobble((size_t)k);
         }
-    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, g);
+    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, 0,
+                             g);
     assert_below(largest(g, 3 * NODES), BETA * stiff * 16 * DBL_EPSILON * (speed + 1));
 
     turn(NODES, bent, 0.7 + omega * STEP, x1);
@@ -129,12 +130,13 @@ TEST(turning_cloth_does_not_feel_its_damping)
         history[i] /= -STEP;
     const drape_point step = {
         .x = x1, .v = v, .internal = state->internal, .weight = 1 / STEP, .history = history};
-    drape_system_dissipation(s.sim->system, &step, g);
+    drape_system_dissipation(s.sim->system, &step, 0, g);
     assert_below(largest(g, 3 * NODES), BETA * stiff * 16 * DBL_EPSILON * 1.0 / STEP);
 
     for (int i = 0; i < 3 * NODES; i++)
         v[i] = i % 3 == 0 ? omega * x0[i] : 0; /* a stretching */
-    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, g);
+    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, 0,
+                             g);
     ck_assert(largest(g, 3 * NODES) > 0.1 * BETA * spring * omega * LENGTH);
 }
 

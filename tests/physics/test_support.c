@@ -314,7 +314,7 @@ TEST(moving_supports_are_those_at_rest_in_a_moving_frame)
         ck_assert_int_eq(drape_sim_reactions(moves.sim, force[1]), DRAPE_OK);
         for (int k = 0; k < 36; k++)
             worst = fmax(worst, fabs(force[0][k] - force[1][k]));
-        const double work = moves.sim->audit.pin_work, lost = drape_sim_energy(rest.sim).numerical,
+        const double work = moves.sim->work[DRAPE_BY_PINS], lost = drape_sim_energy(rest.sim).numerical,
                      lost_moving = drape_sim_energy(moves.sim).numerical;
         const bool own_steps = moves.sim->chosen.integrator->own_steps;
         const double near = own_steps ? 3e-6 : 1e-10;
@@ -350,7 +350,7 @@ TEST(the_work_of_moving_supports_is_in_the_balance)
             "'controller': {'type': '%s'}, 'duration': 1}",
             methods[i], controller(methods[i]));
         scene_advance(&s, 0.2);
-        const double work = s.sim->audit.pin_work, lost = drape_sim_energy(s.sim).numerical;
+        const double work = s.sim->work[DRAPE_BY_PINS], lost = drape_sim_energy(s.sim).numerical;
         printf("# %s: work %.5g, numerical %.3g\n", methods[i], work, lost);
         ck_assert_double_gt(work, 1e-3);
         const double share = s.sim->chosen.integrator->mean_velocities ? 1

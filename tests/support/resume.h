@@ -18,6 +18,11 @@ static inline void scene_resumes(scene straight, scene again, double checkpoint,
                       drape_state_hash(again.model, drape_sim_state(again.sim)),
                   "%s", what);
     ck_assert_double_eq(drape_sim_energy(straight.sim).dissipated, drape_sim_energy(again.sim).dissipated);
+    double works[2];
+    for (int i = 0; drape_sim_work(straight.sim, i, &works[0]); i++) {
+        ck_assert_ptr_nonnull(drape_sim_work(again.sim, i, &works[1]));
+        ck_assert_double_eq(works[0], works[1]);
+    }
     free(saved.data);
     scene_close(&straight), scene_close(&again);
 }
