@@ -15,7 +15,7 @@ def _axes(ax: Any, **options: Any) -> Any:
     return plt.figure(figsize=(6, 4), constrained_layout=True).add_subplot(**options)
 
 
-def energy(run: Union[Run, Any], which: Union[str, Sequence[str]] = ("kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical"), ax: Any = None) -> Any:
+def energy(run: Union[Run, Any], which: Union[str, Sequence[str]] = ("kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical", "work"), ax: Any = None) -> Any:
     """Energies [J] over time [s], of a run or of its table `energy`."""
     ax, columns = _axes(ax), run.energy if isinstance(run, Run) else run
     for name in [which] if isinstance(which, str) else which:

@@ -23,7 +23,7 @@ from .sim import Sim
 Table = Any  # a pandas.DataFrame or, without pandas, a dictionary of arrays
 
 _STEPS = ("attempt", "t", "h", "accepted", "status", "reason", "iterations", "residual", "tolerance", "error", "left")
-_ENERGY = ("frame", "t", "t_state", "kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical")
+_ENERGY = ("frame", "t", "t_state", "kinetic", "elastic", "gravity", "contact", "total", "dissipated", "numerical", "work")
 
 
 def table(columns: Mapping[str, Any]) -> Table:
@@ -267,11 +267,11 @@ def record_sim(sim: Sim, until: Optional[float]) -> Run:
             for name, value in zip(_STEPS, row):
                 steps[name].append(value)
         elif event.kind == EventKind.FRAME:
-            e = sim.energy
+            e, work = sim.energy, sim.work
             total = e.kinetic + e.elastic + e.gravity + e.contact
-            row = (event.frame, event.time, sim.time, e.kinetic, e.elastic, e.gravity, e.contact, total, e.dissipated, e.numerical)
-            for name, value in zip(_ENERGY, row):
-                energies[name].append(value)
+            row = (event.frame, event.time, sim.time, e.kinetic, e.elastic, e.gravity, e.contact, total, e.dissipated, e.numerical, sum(work.values()))
+            for name, value in (*zip(_ENERGY, row), *work.items()):
+                energies.setdefault(name, []).append(value)
             frames.append(event.positions.copy())
 
     def run_so_far(status: Status, message: str) -> Run:
@@ -298,7 +298,7 @@ def _summary(sim: Sim, frames: int, status: Status, message: str) -> Dict[str, A
                       "h_min": s.h_min, "h_max": s.h_max, "reasons": sim.reasons},
             "newton": {"iterations": s.newton_iterations, "jacobians": s.jacobians, "factorizations": s.factorizations,
                        "linear_iterations": s.linear_iterations, "residuals": s.residuals},
-            "energy": e._asdict(), "strain": {"min": s.strain_min, "max": s.strain_max},
+            "energy": e._asdict(), "work": sim.work, "strain": {"min": s.strain_min, "max": s.strain_max},
             "warnings": [w._asdict() for w in sim.warnings], "hash": f"{sim.hash:016x}"}
 
 

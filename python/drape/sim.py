@@ -338,6 +338,18 @@ class Sim:
         return energy
 
     @property
+    @header("drape_sim_work")
+    def work(self) -> Dict[str, float]:
+        """[J] done on the cloth by pins, colliders, the host, and each load and wind, such as "drag.wind of flag"."""
+        work = ctypes.c_double()
+        found: Dict[str, float] = {}
+        with self._lock:
+            while (name := lib.drape_sim_work(self._open(), len(found), ctypes.addressof(work))) is not None:
+                found[name.decode()] = work.value
+            self._raise_pending()
+        return found
+
+    @property
     @header("drape_sim_energy_density")
     def energy_density(self) -> np.ndarray:
         """[J/m2] elastic energy at the nodes."""

@@ -505,6 +505,8 @@ static void print_results(run *r)
     const drape_chosen *chosen = &r->in.sim->chosen;
     const drape_statistics s = drape_sim_statistics(r->in.sim);
     const drape_energy e = drape_sim_energy(r->in.sim);
+    const char *name;
+    double work;
     const struct {
         const char *name;
         double value;
@@ -538,6 +540,9 @@ static void print_results(run *r)
         else
             printf("%s %s %.5g J", i ? "," : "", energies[i].name, energies[i].value);
     fputc('\n', stdout);
+    for (int i = 0; (name = drape_sim_work(r->in.sim, i, &work)); i++)
+        if (work != 0)
+            printf("work      %s %.5g J\n", CLI_SHOWN(name), work);
     print_events(r);
     print_untangling(r);
     if (!model->part)

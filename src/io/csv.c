@@ -69,7 +69,7 @@ const char drape_steps_columns[] = "attempt,t,h,accepted,status,reason,iteration
                                    "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit,"
                                    "error,left,events\n";
 const char drape_energy_columns[] =
-    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
+    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total,work";
 
 static void put_energy(drape_file *file, const drape_energy *energy)
 {
@@ -120,12 +120,18 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
 }
 
 drape_status drape_energy_write(drape_file *file, int64_t frame, double t, double t_state,
-                                const drape_energy *energy)
+                                const drape_energy *energy, drape_sim *sim)
 {
+    double work, sum = 0;
+    for (int i = 0; drape_sim_work(sim, i, &work); i++)
+        sum += work;
     drape_file_print(file, "%" PRId64, frame);
     drape_csv_put_numbers(file, 2, (double[]){t, t_state});
     put_energy(file, energy);
     drape_csv_put_number(file, energy->kinetic + energy->elastic + energy->gravity + energy->contact);
+    drape_csv_put_number(file, sum);
+    for (int i = 0; drape_sim_work(sim, i, &work); i++)
+        drape_csv_put_number(file, work);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
 }

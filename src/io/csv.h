@@ -37,6 +37,6 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
 /* A frame at t [s], whose positions may lie between two states; the energies are those of the first state at
  * or after it, at t_state. Errors: DRAPE_E_FILE. */
 drape_status drape_energy_write(drape_file *file, int64_t frame, double t, double t_state,
-                                const drape_energy *energy);
+                                const drape_energy *energy, drape_sim *sim);
 
 #endif

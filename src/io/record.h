@@ -42,7 +42,7 @@ drape_status drape_record_protect(drape_context *ctx, const char *folder, const 
 /* Gets one row of a table: the texts of the requested columns, valid during the call. */
 typedef void drape_row_reader(void *user, int64_t row, char *const *cells);
 
-#define DRAPE_MOST_COLUMNS 16
+#define DRAPE_MOST_COLUMNS 40
 
 /* Calls reader for each row of folder/name, with the columns of these names in this order; *rows: the
  * number of rows. An incomplete last line is left out. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a column is

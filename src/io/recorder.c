@@ -135,7 +135,8 @@ static void write_all(drape_recorder *r, double time, const double *positions, c
             note(r, o->ops->write(&r->def, o->state, o->ops->y_up ? &f->frame : &f->rotated));
     }
     if (!r->failure)
-        note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy));
+        note(r, drape_energy_write(&r->energies, r->progress.frames, time, drape_sim_time(r->sim), energy,
+                                   r->sim));
 }
 
 static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
@@ -441,6 +442,9 @@ static drape_status open_table(drape_recorder *r, const char *name, const char *
     if (status || r->def.resumes)
         return status;
     drape_file_put_text(file, columns);
+    for (int i = 0; file == &r->energies && (name = drape_sim_work(r->sim, i, NULL)); i++)
+        drape_csv_put_text(file, name);
+    drape_file_put_text(file, file == &r->energies ? "\n" : "");
     return drape_file_publish(file);
 }
 

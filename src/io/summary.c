@@ -203,6 +203,12 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                       {"gravity", e.gravity}, {"contact", e.contact},
                                       {"dissipated", e.dissipated}, {"numerical", e.numerical});
     object = drape_json_with(object, "energy", energy);
+    json_t *works = json_object();
+    const char *name;
+    double work;
+    for (int i = 0; (name = drape_sim_work(sim, i, &work)); i++)
+        works = drape_json_with(works, name, drape_json_number(work));
+    object = drape_json_with(object, "work", works);
     object = drape_json_with(object, "strain",
                              DRAPE_JSON_REALS(json_object(), {"min", s.strain_min}, {"max", s.strain_max}));
     if (s.stability_known) /* of an equilibrium; the number is that of negative eigenvalues of its Hessian */

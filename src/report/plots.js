@@ -199,6 +199,13 @@ function energyPlot() {
   return new Plot({ title: 'Energy', unit: 'J', series });
 }
 
+// The columns after those of the energies.
+function workPlot() {
+  const c = run.energies.columns;
+  const series = Object.keys(c).slice(8).map((name, i) => ({ name, y: c[name], t: c.t_state, color: `var(--c${i % 7})` }));
+  return series.length ? new Plot({ title: 'Work on the cloth', unit: 'J', series, size: 'low' }) : null;
+}
+
 function stepPlot({ c, good, bad }) {
   const series = [{ name: 'accepted', color: 'var(--c1)', steps: true, t: good.map((i) => c.t[i]), y: good.map((i) => c.h[i]) }];
   const marks = bad.map((i) => ({ t: c.t[i], y: c.h[i] }));
@@ -228,5 +235,5 @@ function rejectionPlot({ c, bad }) {
 function makePlots() {
   const c = run.steps.columns, good = [], bad = [], all = { c, good, bad };
   for (let i = 0; i < c.t.length; i++) (c.accepted[i] ? good : bad).push(i);
-  return [energyPlot(), stepPlot(all), iterationPlot(all), rejectionPlot(all)].filter((plot) => plot);
+  return [energyPlot(), workPlot(), stepPlot(all), iterationPlot(all), rejectionPlot(all)].filter((plot) => plot);
 }

@@ -406,17 +406,23 @@ static drape_status put_json(const page *p, drape_file *file)
 {
     static const char *const step_names[] = {"t",        "h",         "accepted", "iterations",
                                              "residual", "tolerance", "reason"};
-    static const char *const energy_names[] = {"t_state", "kinetic",    "elastic",   "gravity",
-                                               "contact", "dissipated", "numerical", "total"};
+    const char *energy_names[DRAPE_MOST_COLUMNS] = {"t_state", "kinetic",    "elastic",   "gravity",
+                                                    "contact", "dissipated", "numerical", "total"};
+    const char *name;
+    json_t *work;
+    int seen = 0;
     const drape_model *model = p->model;
     const drape_record *record = &p->record;
     columns of_steps = {.names = step_names, .count = 7, .text_from = 6, .keep = 2},
-            of_energies = {.names = energy_names, .count = 8, .text_from = 8, .keep = -1};
+            of_energies = {.names = energy_names, .count = 8, .text_from = DRAPE_MOST_COLUMNS, .keep = -1};
     json_t *steps = NULL, *energies = NULL, *pinned = json_array(), *colliders = json_array(),
            *times = json_array(), *numbers = json_array(), *fields = json_array();
     drape_arena scratch = drape_arena_of(p->ctx);
     uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
     drape_status status = is_pinned ? read_columns(p, DRAPE_STEPS_NAME, &of_steps, &steps) : DRAPE_E_MEMORY;
+    json_object_foreach(json_object_get(p->summary, "work"), name,
+                        work) if (seen++ < DRAPE_MOST_COLUMNS - 8 && json_number_value(work) != 0)
+        energy_names[of_energies.count++] = name;
     if (!status)
         status = read_columns(p, DRAPE_ENERGY_NAME, &of_energies, &energies);
     if (is_pinned)

@@ -188,6 +188,24 @@ def test_run_files():
         equal(float(energies[-1][key]), value, "the last row and the summary: " + key)
 
 
+def test_work():
+    """the work of pins, loads and wind is printed, in energy.csv and in the summary, by the names of the scene, and closes the balance"""
+    write_scene(name='the "red", flag', terms=["stretch.edge", {"type": "drag.wind", "wind": [0, 0, 3]}, *({"type": "load.point", "force": [0, 0, f]} for f in (1e-3, 2e-3))],
+                pins=[{"corner": "top-left", "track": [[0, [0, 0, 0]], [0.1, [0, 0.1, 0]]]}])
+    text = good("run", "scene.json", "--summary", "s.json", "--out", "out", "--duration", "0.2", "--integrator", "ida")
+    work = read_json("s.json")["work"]
+    flag = ' of the "red", flag'
+    equal(list(work), ["pins", "colliders", "host", "drag.wind" + flag, "load.point" + flag, "load.point" + flag + " (2)"])
+    equal(re.findall(r"^work +(.*?) (\S+) J$", text, re.M), [(name, f"{value:.5g}") for name, value in work.items() if value])
+    assert abs(work["load.point" + flag + " (2)"] - 2 * work["load.point" + flag]) < 1e-12, work
+    with open("out/energy.csv", encoding="ascii", newline="") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    for row in rows:
+        assert abs(row["work"] - sum(row[name] for name in work)) < 1e-14
+        assert abs(row["total"] + row["dissipated"] + row["numerical"] - row["work"] - rows[0]["total"]) < 1e-13, row
+    equal({name: rows[-1][name] for name in work}, work, "the last row and the summary")
+
+
 def test_realtime():
     """frames with a budget: times, misses and levels are reported, late frames are not failures, files as usual"""
     write_scene()

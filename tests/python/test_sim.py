@@ -620,6 +620,8 @@ def test_reading():
     sim = drape.Sim(sheet(duration=2))
     sim.advance(1.0)
     energy, statistics = sim.energy, sim.statistics
+    equal(list(sim.work)[:3], ["pins", "colliders", "host"])
+    assert abs(sum(energy) - sum(drape.Sim(sheet(duration=2)).energy) - sum(sim.work.values())) < 1e-12 * abs(energy.gravity)
     assert energy.kinetic > 0 and energy.dissipated >= 0 and statistics.steps_accepted == 100 and sim.reasons == {}
     free = ~sim.pinned
     assert not sim.reactions[free].any() and sim.reactions[~free].any()

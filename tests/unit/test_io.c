@@ -569,9 +569,9 @@ TEST(steps_quotes_and_keeps_digits)
 
 /* ---- Energies */
 
-#define ENERGY_FIELDS 10
+#define ENERGY_FIELDS 14
 static const char energy_columns[] =
-    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
+    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total,work,pins,colliders,host\n";
 
 /* The energies of frame k are those of the first state at or after it, as the attempts reported them.
  * Frames of 1/40 s lie on and between steps of 1/100 s; the first one is before all steps. */
@@ -1053,7 +1053,7 @@ TEST(summary_is_complete)
     json_t *json = load_summary(path);
     check_keys(json,
                "status message version nodes dofs nnz frames time steps newton tolerance error wall_s energy "
-               "strain intersections warnings hash ");
+               "work strain intersections warnings hash ");
     check_keys(json_object_get(json, "steps"), "accepted rejected unconverged held h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");
