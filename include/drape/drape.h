@@ -137,7 +137,9 @@ typedef struct drape_mesh_def {
     double rotate[4];                  /* axis x y z and angle [degrees]; default: no rotation; applied
                                           second */
     double translate[3];               /* [m]; default 0; applied last */
-    void *reserved[4];                 /* must be NULL */
+    int32_t subdivide; /* each triangle in four, so many times, at most 12; nodes keep their numbers, and
+                          nodes between pinned ones are pinned; default 0 */
+    void *reserved[3]; /* must be NULL */
 } drape_mesh_def;
 
 /* A key of a track. A track is the displacement of pinned nodes from where they start, or of a collider

@@ -212,6 +212,11 @@ typedef struct drape_cloth_view {
         *edge_image;     /* (edge_count) of periodic edges the one on the other side, which is the same by
                                   a translation; -1: none; NULL: the cloth has no periodic edges */
     const double *start; /* (node_count x 3) where the nodes start [m]: a period stays as it is there */
+    int32_t
+        given_count; /* of the nodes that the source of the mesh has, the first ones; a grid's are these */
+    const int32_t
+        *parent; /* ((node_count - given_count) x 2) the nodes that each further node of a subdivided
+                              mesh is between */
 } drape_cloth_view;
 
 /* A seam at rest: two sides, each a list of nodes of one cloth, which may be the same cloth. Nodes of equal

@@ -399,6 +399,7 @@ static json_t *mesh(const info *in, const drape_cloth *cloth, const drape_mesh_d
         object = drape_json_with(object, "grid", drape_json_text(from->entry.name));
     if (cloth->file)
         object = drape_json_with(object, "file", drape_json_text(cloth->file));
+    object = DRAPE_JSON_COUNTS(object, {"subdivide", def->subdivide});
     return drape_json_with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
 }
 

@@ -2,6 +2,7 @@
 #include "compile/select.h"
 #include "compile/stages.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,17 +29,28 @@ static drape_status take_node(void *user, const char *key, int32_t local)
     return DRAPE_OK;
 }
 
-/* ---- The order of a box ---- */
+/* ---- The order ---- */
 
-/* Sorts the nodes along the longest side of their bounding box. */
+/* Sorts the nodes by a coordinate (nodes of the cloth x step). */
+static drape_status sort_by(side *s, const double *along, size_t step)
+{
+    drape_node_along *list = drape_arena_take(&s->model->scratch, (size_t)s->count, sizeof *list);
+    if (!list)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < s->count; i++)
+        list[i] = (drape_node_along){along[step * (size_t)s->node[i]], s->node[i]};
+    qsort(list, (size_t)s->count, sizeof *list, drape_compare_along);
+    for (int32_t i = 0; i < s->count; i++)
+        s->node[i] = list[i].node;
+    return DRAPE_OK;
+}
+
+/* Sorts the nodes of a box along the longest side of their bounding box. */
 static drape_status sort(side *s)
 {
     const double *x = s->model->cloths[s->cloth].mesh.x;
     double low[3], high[3];
-    drape_node_along *list = drape_arena_take(&s->model->scratch, (size_t)s->count, sizeof *list);
     int axis = 0;
-    if (!list)
-        return DRAPE_E_MEMORY;
     memcpy(low, x + 3 * (size_t)s->node[0], sizeof low);
     memcpy(high, low, sizeof high);
     for (int32_t i = 0; i < s->count; i++)
@@ -49,12 +61,29 @@ static drape_status sort(side *s)
         }
     for (int k = 1; k < 3; k++)
         axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
+    return sort_by(s, x + axis, 3);
+}
+
+/* Of a subdivided mesh, adds the nodes between neighbours. */
+static drape_status insert_middles(side *s)
+{
+    const drape_mesh *mesh = &s->model->cloths[s->cloth].mesh;
+    const int32_t first = mesh->given->node_count;
+    double step = 1; /* between neighbours, which each level of parents halves */
+    double *along = drape_arena_take(&s->model->scratch, (size_t)mesh->node_count, sizeof *along);
+    if (!along)
+        return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < s->count; i++)
-        list[i] = (drape_node_along){x[3 * (size_t)s->node[i] + (size_t)axis], s->node[i]};
-    qsort(list, (size_t)s->count, sizeof *list, drape_compare_along);
-    for (int32_t i = 0; i < s->count; i++)
-        s->node[i] = list[i].node;
-    return DRAPE_OK;
+        along[s->node[i]] = i;
+    for (int32_t i = first; i < mesh->node_count; i++) {
+        const int32_t *of = mesh->parent + 2 * (size_t)(i - first);
+        step = i > first && of[0] < of[-2] ? step / 2 : step; /* the edges of a level ascend */
+        along[i] = (along[of[0]] + along[of[1]]) / 2;
+        s->taken[i] = s->taken[of[0]] && s->taken[of[1]] && fabs(along[of[0]] - along[of[1]]) == step;
+        if (s->taken[i])
+            s->node[s->count++] = i;
+    }
+    return sort_by(s, along, 1);
 }
 
 /* ---- A side ---- */
@@ -77,12 +106,15 @@ static drape_status list_side(side *s)
                                        .form = &drape_form_seam_side,
                                        .mesh = mesh,
                                        DRAPE_SELECTED_BY(def),
+                                       .given = true,
                                        .take = take_node,
                                        .user = s};
     DRAPE_TRY(drape_arena_status(scratch));
     DRAPE_TRY(drape_select_nodes(&selection));
     if (def->has_box)
         DRAPE_TRY(sort(s));
+    if (mesh->given)
+        DRAPE_TRY(insert_middles(s));
     for (int32_t i = 0, j = s->count - 1; def->reverse && i < j; i++, j--) {
         const int32_t node = s->node[i];
         s->node[i] = s->node[j];

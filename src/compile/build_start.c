@@ -25,8 +25,9 @@
 /* ---- Positions ---- */
 
 static drape_status take_file(drape_model *model, const char *pointer, const char *folder,
-                              const drape_start_def *def, const drape_mesh *mesh, double *x)
+                              const drape_start_def *def, const drape_mesh *whole, double *x)
 {
+    const drape_mesh *mesh = drape_mesh_given(whole);
     const char *place = DRAPE_FORMAT("%s/file", pointer);
     const drape_mesh_source source = {.pointer = place, .file = def->file};
     drape_mesh read = {0};
@@ -47,14 +48,17 @@ static drape_status take_file(drape_model *model, const char *pointer, const cha
     }
     if (!status)
         memcpy(x, read.x, 3 * (size_t)mesh->node_count * sizeof *x);
+    if (!status)
+        drape_mesh_fill_middles(whole, x);
     drape_mesh_free(&read);
     return status;
 }
 
 /* An array of the host, of 3 numbers for each node. */
 static drape_status take_array(drape_model *model, const char *pointer, const char *what, const double *from,
-                               size_t given, bool has_file, const drape_mesh *mesh, double *to)
+                               size_t given, bool has_file, const drape_mesh *whole, double *to)
 {
+    const drape_mesh *mesh = drape_mesh_given(whole);
     const size_t count = 3 * (size_t)mesh->node_count;
     if (has_file)
         return drape_refuse(model->ctx, pointer, "a file and an array of %s are given; at most one is", what);
@@ -63,6 +67,7 @@ static drape_status take_array(drape_model *model, const char *pointer, const ch
                             "%zu numbers in %s; the cloth has %d nodes, so there are %zu", given, what,
                             (int)mesh->node_count, count);
     memcpy(to, from, count * sizeof *to);
+    drape_mesh_fill_middles(whole, to);
     return DRAPE_OK;
 }
 
@@ -148,14 +153,15 @@ static drape_status place_nodes(drape_model *model, const char *pointer, const c
 /* ---- Velocities ---- */
 
 static drape_status read_velocities(drape_model *model, const char *pointer, const char *folder,
-                                    const drape_start_def *def, const drape_mesh *mesh, double *v)
+                                    const drape_start_def *def, const drape_mesh *whole, double *v)
 {
+    const drape_mesh *mesh = drape_mesh_given(whole);
     const char *place = DRAPE_FORMAT("%s/velocities", pointer);
     const drape_mesh_source source = {.pointer = place, .file = def->velocity_file};
-    drape_contents whole = {0};
+    drape_contents contents = {0};
     drape_npy_array array = {0};
-    DRAPE_TRY(drape_contents_read(&model->scratch, place, folder, def->velocity_file, &whole));
-    DRAPE_TRY(drape_npy_array_parse(model->ctx, &source, whole.data, whole.size, &array));
+    DRAPE_TRY(drape_contents_read(&model->scratch, place, folder, def->velocity_file, &contents));
+    DRAPE_TRY(drape_npy_array_parse(model->ctx, &source, contents.data, contents.size, &array));
     if (array.dimensions != 2 || array.shape[0] != mesh->node_count || array.shape[1] != 3)
         return drape_mesh_fail(model->ctx, &source, 0,
                                "an array of %" PRId64 " x %" PRId64 " x %" PRId64
@@ -163,6 +169,7 @@ static drape_status read_velocities(drape_model *model, const char *pointer, con
                                array.shape[0], array.shape[1], array.shape[2], (int)mesh->node_count);
     for (size_t i = 0; i < 3 * (size_t)mesh->node_count; i++)
         v[i] = drape_npy_array_at(&array, i);
+    drape_mesh_fill_middles(whole, v);
     return DRAPE_OK;
 }
 

@@ -46,6 +46,8 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .rows = m->rows,
                               .columns = m->columns,
                               .rectangular = m->rectangular,
+                              .given_count = drape_mesh_given(m)->node_count,
+                              .parent = m->parent,
                               .material = &cloth->material,
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
                               .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,

@@ -49,7 +49,8 @@ static drape_status take_box(const drape_selection *s)
             return drape_fail_below(s->ctx, s->pointer, "box", "min must not be above max in any coordinate");
     DRAPE_TRY(drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count));
     int32_t taken = 0;
-    for (int32_t i = 0; i < s->mesh->node_count; i++) {
+    const int32_t count = s->given ? drape_mesh_given(s->mesh)->node_count : s->mesh->node_count;
+    for (int32_t i = 0; i < count; i++) {
         const double *x = s->mesh->x + 3 * (size_t)i;
         bool inside = true;
         for (int k = 0; k < 3; k++) {
@@ -66,7 +67,7 @@ static drape_status take_box(const drape_selection *s)
     return DRAPE_OK;
 }
 
-drape_status drape_select_nodes(const drape_selection *s)
+static drape_status select_given(const drape_selection *s)
 {
     const char *on_grid = s->corner ? "corner" : s->edge ? "edge" : s->row >= 0 ? "row" : NULL;
     int given = (s->nodes != NULL) + (s->corner != NULL) + (s->edge != NULL) + (s->row >= 0) + s->has_box;
@@ -100,6 +101,38 @@ drape_status drape_select_nodes(const drape_selection *s)
         return drape_fail_below(s->ctx, s->pointer, "row", "row %d is not in the mesh; its rows are 0 to %d",
                                 (int)s->row, (int)s->mesh->rows - 1);
     return take_range(s, "row", s->row, s->row, 0, s->mesh->columns - 1);
+}
+
+/* What a selection has taken of a mesh that is subdivided. */
+typedef struct spread {
+    const drape_selection *of;
+    uint8_t *taken; /* (node_count) */
+} spread;
+
+static drape_status take_and_mark(void *user, const char *key, int32_t local)
+{
+    const spread *p = user;
+    p->taken[local] = 1;
+    return p->of->take(p->of->user, key, local);
+}
+
+drape_status drape_select_nodes(const drape_selection *s)
+{
+    const drape_mesh *mesh = s->mesh;
+    if (s->given || !mesh->given)
+        return select_given(s);
+    spread p = {s, drape_alloc(s->ctx, (size_t)mesh->node_count, 1)};
+    drape_selection marked = *s;
+    marked.take = take_and_mark;
+    marked.user = &p;
+    drape_status status = p.taken ? select_given(&marked) : DRAPE_E_MEMORY;
+    for (int32_t i = mesh->given->node_count; i < mesh->node_count && !status; i++) {
+        const int32_t *between = mesh->parent + 2 * (size_t)(i - mesh->given->node_count);
+        if (!p.taken[i] && p.taken[between[0]] && p.taken[between[1]])
+            status = take_and_mark(&p, "nodes", i);
+    }
+    drape_free(s->ctx, p.taken);
+    return status;
 }
 
 int drape_compare_along(const void *a, const void *b)

@@ -20,6 +20,8 @@ typedef struct drape_selection {
     int32_t row;
     bool has_box;
     const double *box_min, *box_max;
+    bool given; /* of a subdivided mesh: only nodes that its source has. If not, nodes between selected ones
+                   are selected, too, after these */
     drape_select_take *take;
     void *user;
 } drape_selection;

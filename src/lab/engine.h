@@ -41,8 +41,9 @@ typedef struct lab_request {
     const double *times;        /* (time_count) [s] at which steps end, and at which it is compared and
                                    recorded; NULL: at frames, which may lie within steps, and at the end */
     size_t time_count;
-    const lab_probe *probe; /* NULL or no points: nowhere */
-    lab_trace *record;      /* its frames and, last, its end; or its states at `times`; none of a run that
+    const int32_t
+        *compared;     /* (cloths) so many nodes of each have their positions in the result; NULL: none */
+    lab_trace *record; /* its frames and, last, its end; or its states at `times`; none of a run that
                                    did not complete. NULL: not recorded. Made in: */
     drape_arena *arena;
     double seconds;  /* CPU: a run that takes more is stopped */
@@ -66,7 +67,7 @@ typedef struct lab_experiment_ops {
     /* Sets the scene of a case, and what the case is compared with, where the experiment has several scenes.
      * NULL: all cases are of the def's scene, and compared with l->reference. */
     void (*request)(const lab *l, size_t index, lab_request *request);
-    /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
+    /* Makes l->reference or l->compared. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
     /* Writes figures, sentences (l->summary) and the body of the page (lab_page_*). All cases have
      * results; with `partial`, any of them may be missing. */
@@ -80,7 +81,7 @@ extern const drape_registry lab_experiment_registry;
 
 struct lab {
     drape_context *ctx;
-    drape_arena arena; /* of folder, the array of results, reference, probe */
+    drape_arena arena; /* of folder, the array of results, reference */
     const drape_lab_def *def;
     drape_lab_outcome *outcome; /* the caller's */
     const lab_experiment_ops *experiment;
@@ -97,7 +98,7 @@ struct lab {
     double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
     double start;              /* [s] wall clock at the start of the run */
     void *own;                 /* of the experiment, in the arena */
-    lab_probe probe;           /* where final positions are taken; no points: nowhere */
+    int32_t *compared;         /* in the arena; of requests */
     FILE *summary;             /* sentences for the terminal and the head of the page, one a line */
     char *summary_text;        /* valid when summary is flushed or closed */
     size_t summary_size;

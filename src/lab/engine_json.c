@@ -60,7 +60,7 @@ lab_request lab_request_of(const lab *l, size_t index)
                            .settings = json_object_get(json_array_get(l->cases, index), "settings"),
                            .reference = &l->reference,
                            .reference_error = l->reference_error,
-                           .probe = &l->probe,
+                           .compared = l->compared,
                            .seconds = l->def->case_seconds,
                            .repeats = l->experiment->compares_costs ? l->def->repeats : 1};
     if (l->experiment->request)

@@ -294,13 +294,11 @@ static json_t *describe(const run *r, drape_sim *sim)
         json_object_set_new(result, "error_max", drape_json_number(r->status ? NAN : r->far / size));
         json_object_set_new(result, "mescd", drape_json_number(digits));
     }
-    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
-    for (size_t i = 0; positions && i < request->probe->count; i++) {
-        double point[3];
-        lab_probe_take(request->probe, i, r->model, x, point);
-        for (int k = 0; k < 3; k++)
-            json_array_append_new(positions, drape_json_number(point[k]));
-    }
+    json_t *positions = request->compared ? json_array() : NULL;
+    for (int32_t c = 0; positions && c < r->model->cloth_count; c++)
+        for (size_t i = 0; i < 3 * (size_t)request->compared[c]; i++)
+            json_array_append_new(positions,
+                                  drape_json_number(x[3 * (size_t)r->model->cloths[c].first_node + i]));
     if (positions)
         json_object_set_new(result, "positions", positions);
     return result;
@@ -385,55 +383,4 @@ double lab_correct_digits(const drape_model *model, const double *x, const doubl
     for (size_t i = 0; i < 3 * (size_t)drape_model_node_count(model); i++)
         largest = fmax(largest, fabs(x[i] - y[i]) / (model->length + fabs(y[i] - rest[i])));
     return largest > 0 ? -log10(largest) : INFINITY;
-}
-
-drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe)
-{
-    const size_t count = (size_t)drape_model_node_count(model);
-    *probe = (lab_probe){.count = count, .rest = drape_arena_take(arena, 3 * count, sizeof *probe->rest)};
-    if (!probe->rest)
-        return DRAPE_E_MEMORY;
-    memcpy(probe->rest, drape_model_rest_positions(model), 3 * count * sizeof *probe->rest);
-    return DRAPE_OK;
-}
-
-/* The barycentric coordinates of the projection of p on a triangle's plane. Returns the square of p's
- * distance from the triangle if they are all positive, more otherwise. */
-static double place_in(const double *rest, const int32_t *triangle, const double *p, double *weights)
-{
-    const double *a = rest + 3 * (size_t)triangle[0];
-    double u[3], v[3], w[3];
-    vec3_sub(rest + 3 * (size_t)triangle[1], a, u);
-    vec3_sub(rest + 3 * (size_t)triangle[2], a, v);
-    vec3_sub(p, a, w);
-    double uu = vec3_dot(u, u), uv = vec3_dot(u, v), vv = vec3_dot(v, v), wu = vec3_dot(w, u),
-           wv = vec3_dot(w, v), det = uu * vv - uv * uv, outside = 0, off[3];
-    weights[1] = (vv * wu - uv * wv) / det;
-    weights[2] = (uu * wv - uv * wu) / det;
-    weights[0] = 1 - weights[1] - weights[2];
-    for (int k = 0; k < 3; k++)
-        off[k] = w[k] - weights[1] * u[k] - weights[2] * v[k];
-    for (int k = 0; k < 3; k++)
-        outside = fmax(outside, -weights[k]);
-    return vec3_dot(off, off) + outside * outside * (uu + vv);
-}
-
-void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
-                    double out[3])
-{
-    const double *rest = drape_model_rest_positions(model);
-    const int32_t *triangles = drape_model_triangles(model), *home = triangles;
-    double best = INFINITY, weights[3], chosen[3] = {0};
-    for (int32_t t = 0; t < drape_model_triangle_count(model) && best > 0; t++) {
-        const int32_t *triangle = triangles + 3 * (size_t)t;
-        const double miss = place_in(rest, triangle, probe->rest + 3 * i, weights);
-        if (!(miss < best))
-            continue;
-        best = miss;
-        home = triangle;
-        memcpy(chosen, weights, sizeof chosen);
-    }
-    for (size_t k = 0; k < 3; k++)
-        out[k] = chosen[0] * x[3 * (size_t)home[0] + k] + chosen[1] * x[3 * (size_t)home[1] + k] +
-                 chosen[2] * x[3 * (size_t)home[2] + k];
 }

@@ -2,7 +2,7 @@
  * converge: orders of convergence without a reference. A setting is halved again and again; the distances
  * between the ends of successive runs fall like a power of it, whose exponent is the order: straight lines in
  * logarithms. In time dt is halved (integrators that choose their steps: rtol is cut to a tenth), in space
- * the edges of every grid, with positions compared at the nodes of the coarsest mesh.
+ * the edges of every mesh, with positions compared at the nodes of the coarsest one.
  *
  * A line is fitted through refinements of one order only: from the finest on, as long as the orders between
  * neighbours agree. Over rtol the slope is that of the error control, 1 where the error is proportional to
@@ -51,34 +51,13 @@ static drape_status add_time(lab *l, const drape_integrator_ops *integrator, con
     return lab_add_integrator(l, &grid, integrator);
 }
 
-/* A grid with its edges cut into so many parts: counts of nodes n become (n - 1) f + 1, of edges n f. */
-static void refine(const drape_entry_def *grid, size_t cloth, int factor, json_t *settings)
-{
-    for (size_t i = 0; i < grid->setting_count; i++) {
-        const char *key = grid->settings[i].name;
-        double value = grid->settings[i].number;
-        char pointer[96];
-        snprintf(pointer, sizeof pointer, "/cloth/%zu/mesh/%s", cloth, key);
-        if (strcmp(key, "columns") == 0 || strcmp(key, "rows") == 0)
-            json_object_set_new(settings, pointer, json_integer(((json_int_t)value - 1) * factor + 1));
-        else if (strcmp(key, "edges") == 0)
-            json_object_set_new(settings, pointer, json_integer((json_int_t)value * factor));
-        else if (strcmp(key, "edge_length") == 0)
-            json_object_set_new(settings, pointer, json_real(value / factor));
-    }
-}
-
+/* The meshes of all cloths subdivided so many times more. */
 static drape_status add_level(lab *l, const drape_scene_def *def, int level)
 {
     json_t *settings = json_object();
-    for (size_t c = 0; c < def->cloth_count; c++) {
-        if (!def->cloths[c].mesh.grid.type) {
-            json_decref(settings);
-            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "/cloth/%zu/mesh: convergence in space refines grids, and this is not one", c);
-        }
-        refine(&def->cloths[c].mesh.grid, c, 1 << level, settings);
-    }
+    for (size_t c = 0; c < def->cloth_count; c++)
+        json_object_set_new(settings, DRAPE_FORMAT("/cloth/%zu/mesh/subdivide", c),
+                            json_integer(def->cloths[c].mesh.subdivide + level));
     return lab_add_point(
         l, &(lab_point){NULL, SPACE, SPACE_METHOD, NULL, "edge", {ldexp(1, -level), -1}, settings});
 }
@@ -104,13 +83,16 @@ static drape_status plan(lab *l)
     return status;
 }
 
-/* All runs are compared at the nodes of the scene's own mesh. */
+/* All runs are compared at the nodes of the scene's own meshes, which keep their numbers in finer ones. */
 static drape_status prepare(lab *l)
 {
     drape_model *model = NULL;
     drape_status status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
-    if (!status)
-        status = lab_probe_create(&l->arena, model, &l->probe);
+    if (!status &&
+        !(l->compared = drape_arena_take(&l->arena, (size_t)model->cloth_count, sizeof *l->compared)))
+        status = DRAPE_E_MEMORY;
+    for (int32_t c = 0; !status && c < model->cloth_count; c++)
+        l->compared[c] = model->cloths[c].mesh.node_count;
     drape_model_destroy(&model);
     return status;
 }

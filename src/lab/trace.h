@@ -23,18 +23,4 @@ double lab_distance(const drape_model *model, const double *a, const double *b);
  * displacement. INFINITY: they are the same. */
 double lab_correct_digits(const drape_model *model, const double *x, const double *y);
 
-/* Material points: where the nodes of one mesh lie in the rest shape of another, finer one of the same
- * cloth. */
-typedef struct lab_probe {
-    size_t count;
-    double *rest; /* (count x 3) [m], in an arena */
-} lab_probe;
-
-/* At the nodes of a model. Errors: DRAPE_E_MEMORY. */
-drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe);
-
-/* The position of point i: linear in the triangle that it lies in, or is nearest to, at rest. */
-void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
-                    double out[3]);
-
 #endif

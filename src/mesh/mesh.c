@@ -119,6 +119,7 @@ static drape_status make(drape_context *ctx, const char *pointer, const drape_me
     DRAPE_TRY(drape_mesh_connect(ctx, &source, mesh));
     DRAPE_TRY(drape_check_cancel(ctx));
     DRAPE_TRY(drape_mesh_validate_nodes(ctx, &source, mesh));
+    DRAPE_TRY(drape_mesh_subdivide(ctx, &source, def->subdivide, mesh));
     return drape_mesh_measure(mesh);
 }
 

@@ -11,22 +11,32 @@
 typedef struct drape_mesh {
     drape_arena arena; /* holds the arrays below */
     int32_t node_count, triangle_count, edge_count, hinge_count;
-    int32_t rows, columns;  /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
-    bool rectangular;       /* a grid whose cells are rectangles before the transform */
-    double *x;              /* (node_count x 3) [m] */
-    int32_t *triangle;      /* (triangle_count x 3) */
-    int32_t *edge;          /* (edge_count x 2) lower node first, sorted by (lower, higher) */
-    int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge, lower first; second -1 on the
+    int32_t rows, columns;    /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;         /* a grid whose cells are rectangles before the transform */
+    double *x;                /* (node_count x 3) [m] */
+    int32_t *triangle;        /* (triangle_count x 3) */
+    int32_t *edge;            /* (edge_count x 2) lower node first, sorted by (lower, higher) */
+    int32_t *edge_triangle;   /* (edge_count x 2) triangles beside the edge, lower first; second -1 on the
                                boundary */
-    int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
-    int32_t *hinge;         /* (hinge_count x 4) x0 x1: the edge; x2, x3: the apices of its first and second
+    int32_t *triangle_edge;   /* (triangle_count x 3) the edge from corner k to corner k + 1 */
+    int32_t *hinge;           /* (hinge_count x 4) x0 x1: the edge; x2, x3: the apices of its first and second
                                triangle */
-    int32_t *hinge_edge;    /* (hinge_count) in the order of edges */
-    double *triangle_area;  /* (triangle_count) [m2] */
-    double *edge_length;    /* (edge_count) [m] */
-    double *node_area;      /* (node_count) a third of the area of each triangle around it [m2] */
-    drape_faces faces;      /* of the file; all zeros: the triangles are all there is */
+    int32_t *hinge_edge;      /* (hinge_count) in the order of edges */
+    double *triangle_area;    /* (triangle_count) [m2] */
+    double *edge_length;      /* (edge_count) [m] */
+    double *node_area;        /* (node_count) a third of the area of each triangle around it [m2] */
+    drape_faces faces;        /* of the file; all zeros: the triangles are all there is */
+    int32_t subdivided;       /* so many times */
+    struct drape_mesh *given; /* of a subdivided mesh: the counts, triangles and faces of its source, whose
+                                 nodes are its first ones, and whose rows and columns it keeps; NULL: it is
+                                 not subdivided */
+    int32_t *parent; /* ((node_count - given->node_count) x 2) each further node is between these two */
 } drape_mesh;
+
+static inline const drape_mesh *drape_mesh_given(const drape_mesh *mesh)
+{
+    return mesh->given ? mesh->given : mesh;
+}
 
 /* These limits keep every count and every corner number (3 per triangle) within int32_t. Offsets into arrays
  * are size_t, because four nodes per hinge exceed it. */
@@ -131,6 +141,16 @@ int32_t drape_edge_between(const int32_t *edge, int32_t edge_count, int32_t a, i
 drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_source *source,
                                        const drape_mesh *mesh);
 
+/* Cuts each triangle of a connected mesh in four similar ones, so many times; the mesh is connected again.
+ * The faces of the file are gone. source: for messages. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (too many
+ * nodes), DRAPE_E_STOPPED. */
+drape_status drape_mesh_subdivide(drape_context *ctx, const drape_mesh_source *source, int times,
+                                  drape_mesh *mesh);
+
+/* Sets vectors (node_count x 3) of the nodes that the given mesh does not have to the means of their
+ * parents. */
+void drape_mesh_fill_middles(const drape_mesh *mesh, double *values);
+
 /* Computes areas, lengths and lumped node areas. */
 drape_status drape_mesh_measure(drape_mesh *mesh);
 
@@ -139,7 +159,8 @@ drape_status drape_mesh_measure(drape_mesh *mesh);
 drape_status drape_mesh_place(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                               const char *folder, drape_mesh *mesh);
 
-/* Runs all stages: source, transform, validate, connect, measure. pointer names the mesh: "/cloth/0/mesh".
+/* Runs all stages: source, transform, validate, connect, subdivide, measure. pointer names the mesh:
+ * "/cloth/0/mesh".
  * folder is the one that a relative file name refers to, NULL for the working directory. *mesh is
  * overwritten; it is empty on failure. */
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,

@@ -209,7 +209,12 @@ const drape_scene_object drape_form_transform = {.name = "transform", KEYS(trans
             .offset = (at), .child = &drape_form_transform                                                   \
     }
 
-static const drape_scene_key mesh_keys[] = {MESH_KEYS(0)};
+static const drape_scene_key mesh_keys[] = {
+    MESH_KEYS(0),
+    {DRAPE_INTEGER("subdivide", "1", 0, 0, 12,
+                   "each triangle in four, so many times; nodes keep their numbers, and nodes between pinned "
+                   "ones are pinned"),
+     IN(drape_mesh_def, subdivide)}};
 static const char *const mesh_sources[] = {"grid", "file", NULL};
 const drape_scene_object drape_form_mesh = {.name = "mesh",
                                             KEYS(mesh_keys),

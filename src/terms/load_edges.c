@@ -21,6 +21,10 @@ bool drape_load_in_box(const double *x, const double *low, const double *high)
 
 static bool on_side(const drape_cloth_view *cloth, int side, int32_t node)
 {
+    if (node >= cloth->given_count) {
+        const int32_t *between = cloth->parent + 2 * (size_t)(node - cloth->given_count);
+        return on_side(cloth, side, between[0]) && on_side(cloth, side, between[1]);
+    }
     const int32_t row = node / cloth->columns, column = node % cloth->columns;
     return side == TOP      ? row == 0
            : side == BOTTOM ? row == cloth->rows - 1

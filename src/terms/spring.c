@@ -80,7 +80,8 @@ double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pai
 drape_status drape_spring_build(const drape_spring_set *set, const double *values,
                                 drape_term_builder *builder)
 {
-    if (values[DRAPE_SPRING_GRADIENT] != 0 && set->cloth->rows == 0)
+    if (values[DRAPE_SPRING_GRADIENT] != 0 &&
+        !(set->cloth->rows > 0 && set->cloth->node_count == set->cloth->given_count))
         return drape_term_refuse(builder,
                                  "\"gradient\" = %g goes from row to row of a grid; this mesh has no rows",
                                  values[DRAPE_SPRING_GRADIENT]);
@@ -110,9 +111,11 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
     const drape_spring_set set = {.cloth = cloth,
                                   .offset = drape_spring_offsets + kind,
                                   .offset_count = DRAPE_SPRING_SHEAR - DRAPE_SPRING_STRUCTURAL};
-    if (!cloth->rectangular)
-        return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"; other "
-                                          "meshes have only spring.structural, along edges");
+    if (!drape_spring_on_grid(cloth))
+        return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"%s",
+                                 cloth->rectangular
+                                     ? ", which is not to be subdivided"
+                                     : "; other meshes have only spring.structural, along edges");
     return drape_spring_build(&set, values, builder);
 }
 

@@ -46,6 +46,12 @@ typedef struct drape_spring_set {
     int offset_count;
 } drape_spring_set;
 
+/* Whether there are springs by offsets. */
+static inline bool drape_spring_on_grid(const drape_cloth_view *cloth)
+{
+    return cloth->rectangular && cloth->node_count == cloth->given_count;
+}
+
 int32_t drape_spring_count(const drape_spring_set *set);
 void drape_spring_pair(const drape_spring_set *set, int32_t spring, int32_t pair[2]);
 

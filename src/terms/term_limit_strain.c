@@ -76,7 +76,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     const bool springs = values[PARAM_OVER] == OVER_SPRINGS;
     const drape_spring_set set = {
         .cloth = cloth, .offset = drape_spring_offsets, .offset_count = springs ? DRAPE_SPRING_OFFSETS : 0};
-    if (springs && !cloth->rectangular)
+    if (springs && !drape_spring_on_grid(cloth))
         return drape_term_refuse(
             builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has only edges");
     int32_t count = drape_spring_count(&set);

@@ -26,17 +26,17 @@ static bool takes(const drape_cloth_view *cloth, const double *values, int32_t i
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     int32_t count = 0, next = 0;
-    if (values[PARAM_NODE] >= cloth->node_count)
+    if (values[PARAM_NODE] >= cloth->given_count)
         return drape_term_refuse(builder,
                                  "there is no node %d; the mesh has the nodes 0 to "
                                  "%d",
-                                 (int)values[PARAM_NODE], (int)cloth->node_count - 1);
-    for (int32_t i = 0; i < cloth->node_count; i++)
+                                 (int)values[PARAM_NODE], (int)cloth->given_count - 1);
+    for (int32_t i = 0; i < cloth->given_count; i++)
         count += takes(cloth, values, i);
     if (count == 0)
         return drape_term_refuse(builder, "no such node of the mesh lies in the box");
     DRAPE_TRY(drape_term_reserve(builder, count, 0));
-    for (int32_t i = 0; i < cloth->node_count; i++)
+    for (int32_t i = 0; i < cloth->given_count; i++)
         if (takes(cloth, values, i))
             drape_term_set(builder, next++, &i, NULL);
     return DRAPE_OK;

@@ -361,15 +361,13 @@ def test_one_order_is_fitted():
 
 
 def test_converge_in_space():
-    """converge refines grids, and refuses meshes that are not grids"""
-    write_scene()
-    out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--space", "--out", "c")
-    assert re.search(r"^space: order", out, re.M), out
-    nodes = [r["nodes"] for r in lines("c").values() if r["tags"]["series"] == "space"]
-    equal(sorted(nodes), [16, 49, 169], "nodes")
+    """converge subdivides meshes of any kind"""
     write_text("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
-    write_scene(mesh={"file": "sheet.obj"}, pins=[{"nodes": [0]}])
-    refused("converge", "scene.json", "--space", "--out", "d", says="refines grids")
+    for more, sizes in ({}, [16, 49, 169]), ({"mesh": {"file": "sheet.obj"}, "pins": [{"nodes": [0, 1]}]}, [3, 6, 15]):
+        write_scene(**more)
+        out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--space", "--out", f"c{len(more)}")
+        assert re.search(r"^space: order", out, re.M), out
+        equal(sorted(r["nodes"] for r in lines(f"c{len(more)}").values() if r["tags"]["series"] == "space"), sizes, "nodes")
 
 
 def test_shards():

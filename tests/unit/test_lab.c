@@ -1,4 +1,4 @@
-/* test_lab.c: the measures of experiments: fitted powers, material points on other meshes, distances. */
+/* test_lab.c: the measures of experiments: fitted powers, distances. */
 #include "lab/engine_output.h"
 #include "lab/fit.h"
 #include "lab/trace.h"
@@ -57,35 +57,6 @@ TEST(confidence_is_students)
     ck_assert_double_eq_tol(line.high - line.slope, half, 1e-8);
     ck_assert_double_eq_tol(line.slope - line.low, half, 1e-8);
     ck_assert(isnan(lab_fit_power(x, y, 2).low));
-}
-
-/* A field that is linear in the rest positions is linear in every triangle: its interpolation at the nodes of
- * another mesh is exact, whichever triangle a point on an edge is assigned to. */
-TEST(a_linear_field_is_taken_exactly)
-{
-    scoped_context *ctx = make_context();
-    scoped_model *coarse = sheet(ctx, 6, 4), *fine = sheet(ctx, 8, 9);
-    drape_arena arena = drape_arena_of(ctx);
-    lab_probe probe;
-    size_t n = 3 * (size_t)drape_model_node_count(fine), points = (size_t)drape_model_node_count(coarse);
-    double *x = drape_alloc(ctx, n, sizeof *x), *out = drape_alloc(ctx, 3 * points, sizeof *out);
-    const double *rest = drape_model_rest_positions(fine), *at = drape_model_rest_positions(coarse);
-    ck_assert_int_eq(lab_probe_create(&arena, coarse, &probe), DRAPE_OK);
-    for (size_t i = 0; i < n; i += 3) {
-        x[i] = 1 + 2 * rest[i] - rest[i + 2];
-        x[i + 1] = 3 * rest[i + 2];
-        x[i + 2] = -rest[i];
-    }
-    for (size_t i = 0; i < points; i++)
-        lab_probe_take(&probe, i, fine, x, out + 3 * i);
-    for (size_t i = 0; i < 3 * points; i += 3) {
-        ck_assert_double_eq_tol(out[i], 1 + 2 * at[i] - at[i + 2], 1e-14);
-        ck_assert_double_eq_tol(out[i + 1], 3 * at[i + 2], 1e-14);
-        ck_assert_double_eq_tol(out[i + 2], -at[i], 1e-14);
-    }
-    drape_arena_free(&arena);
-    drape_free(ctx, x);
-    drape_free(ctx, out);
 }
 
 /* Pinned nodes do not count: if all free ones have moved by 5, the distance is 5. */
