@@ -280,25 +280,17 @@ static drape_status refine(accurate *a, const drape_sim_def *given)
     return status;
 }
 
-drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
+drape_status drape_accuracy_check_runs(drape_context *ctx, const drape_model *m)
 {
-    const drape_distance *asked = &m->accuracy;
-    const int number =
-        m->integrator_named ? drape_registry_find(&drape_integrator_registry, ctx, m->integrator.type) : -1;
-    const drape_integrator_ops *named = number >= 0 ? drape_integrators[number] : NULL;
-    if (!(asked->value > 0))
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "the scene asks for no accuracy");
-    if (asked->value / (asked->is_share ? 1 : m->length) < LEAST)
-        return drape_fail_at(
-            ctx, DRAPE_E_ARGUMENT, "/accuracy",
-            "%.3g%s is below what double precision gives: at least %.0e of a cloth's diagonal", asked->value,
-            asked->is_share ? "" : " m", LEAST);
-    if (named && (named->projects_contact || named->steady_state))
+    drape_chosen chosen;
+    DRAPE_TRY(drape_choose(ctx, m, NULL, &chosen));
+    const drape_integrator_ops *method = chosen.integrator;
+    if (method->projects_contact || method->steady_state)
         return drape_fail_at(
             ctx, DRAPE_E_ARGUMENT, "/integrator/method",
             "\"%s\" does not converge to the motion of the model, so it has no accuracy; leave "
             "it out, and a method is chosen",
-            named->entry.name);
+            method->entry.name);
     for (int32_t i = 0; i < m->event_count; i++)
         if (m->events[i].action == DRAPE_ACTION_STOP)
             return drape_fail_at(
@@ -308,6 +300,19 @@ drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
     if (m->part)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "runs on several ranks are not repeated");
     return DRAPE_OK;
+}
+
+drape_status drape_accuracy_check(drape_context *ctx, const drape_model *m)
+{
+    const drape_distance *asked = &m->accuracy;
+    if (!(asked->value > 0))
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/accuracy", "the scene asks for no accuracy");
+    if (asked->value / (asked->is_share ? 1 : m->length) < LEAST)
+        return drape_fail_at(
+            ctx, DRAPE_E_ARGUMENT, "/accuracy",
+            "%.3g%s is below what double precision gives: at least %.0e of a cloth's diagonal", asked->value,
+            asked->is_share ? "" : " m", LEAST);
+    return drape_accuracy_check_runs(ctx, m);
 }
 
 drape_status drape_run_accurately(drape_context *ctx, const drape_model *model, const drape_sim_def *def,

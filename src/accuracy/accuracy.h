@@ -9,7 +9,9 @@
 
 #include "sim/sim.h"
 
-/* Errors: DRAPE_E_ARGUMENT: a model cannot be run so, with the reason. */
+/* Whether runs of a model can be compared at all, and be repeated until its accuracy is reached. Errors:
+ * DRAPE_E_ARGUMENT: no, with the reason. */
+drape_status drape_accuracy_check_runs(drape_context *ctx, const drape_model *model);
 drape_status drape_accuracy_check(drape_context *ctx, const drape_model *model);
 
 #endif

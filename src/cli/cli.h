@@ -136,6 +136,9 @@ int cli_print_json(const cli_command *command, json_t *value, size_t flags);
  * printed. */
 int cli_find_shading(const cli_command *command, const char *name, int *index);
 
+/* An estimate of the error of a run, as text. */
+void cli_accuracy_text(const drape_model *model, const drape_accuracy *accuracy, char *text, size_t size);
+
 /* ---- Pictures ---- */
 
 /* A frame of a run, its nodes coloured by distances. */

@@ -5,6 +5,7 @@
 #include "io/csv.h"
 #include "io/export.h"
 #include "io/json.h"
+#include "io/summary.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -54,7 +55,7 @@ static int open_side(const cli_command *command, char *folder, side *s)
         return code;
     s->x = drape_arena_take(command->arena, (size_t)s->run.nodes, 3 * sizeof *s->x);
     s->end = s->run.times[s->run.frames - 1];
-    if (!s->x || drape_record_summary(&s->run, &summary))
+    if (!s->x || drape_record_json(&s->run, DRAPE_SUMMARY_NAME, &summary))
         return cli_report(command, CLI_BAD_INPUT);
     const char *status = json_string_value(json_object_get(summary, "status")),
                *message = json_string_value(json_object_get(summary, "message"));

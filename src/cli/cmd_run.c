@@ -481,18 +481,23 @@ static void print_solver(const run *r, const drape_statistics *s)
 }
 
 /* What is known of the error, and until when. */
+void cli_accuracy_text(const drape_model *model, const drape_accuracy *a, char *text, size_t size)
+{
+    snprintf(
+        text, size,
+        "%.3g mm, %.2g %% of the diagonal, RMS over the nodes of %s; node %d by up to %.3g mm at t=%.4g s "
+        "near (%.4g, %.4g, %.4g) m",
+        1e3 * a->distance, 100 * a->error, CLI_SHOWN(model->cloths[a->cloth].name), (int)a->node,
+        1e3 * a->worst, a->time, a->place[0], a->place[1], a->place[2]);
+}
+
 static void print_accuracy(const run *r)
 {
     const drape_accuracy *a = &r->accuracy;
-    printf("accuracy  %s, the last of %d runs: ", a->method, (int)a->runs);
-    if (isnan(a->error))
-        puts("its error is not known");
-    else
-        printf("%.2g of the diagonal (%.3g m) from the motion, RMS over the nodes of %s, by estimate; node "
-               "%d up to "
-               "%.3g m at t=%.4g s near (%.4g, %.4g, %.4g)\n",
-               a->error, a->distance, CLI_SHOWN(r->in.model->cloths[a->cloth].name), (int)a->node, a->worst,
-               a->time, a->place[0], a->place[1], a->place[2]);
+    char text[512];
+    cli_accuracy_text(r->in.model, a, text, sizeof text);
+    printf("accuracy  %s, the last of %d runs: %s%s\n", a->method, (int)a->runs,
+           isnan(a->error) ? "its error is not known" : "by estimate, off by ", isnan(a->error) ? "" : text);
     if (!a->reached && !r->status)
         printf("accuracy  not as asked: within %.2g until t=%.4g s only; after that runs by smaller steps "
                "part\n",

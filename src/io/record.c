@@ -33,13 +33,13 @@ drape_status drape_record_scene(drape_context *ctx, const char *folder, char **p
         "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY " that can be read", folder);
 }
 
-drape_status drape_record_summary(const drape_record *run, json_t **summary)
+drape_status drape_record_json(const drape_record *run, const char *name, json_t **out)
 {
     drape_context *ctx = run->ctx;
-    char *path = drape_disk_path(ctx, run->folder, DRAPE_SUMMARY_NAME), *text = NULL;
+    char *path = drape_disk_path(ctx, run->folder, name), *text = NULL;
     size_t size = 0;
     json_error_t error = {0};
-    *summary = NULL;
+    *out = NULL;
     if (!path)
         return DRAPE_E_MEMORY;
     drape_status status = DRAPE_OK;
@@ -49,8 +49,8 @@ drape_status drape_record_summary(const drape_record *run, json_t **summary)
     else if (errno != ENOENT) /* a run that was killed has none */
         status = DRAPE_E_FILE;
     if (text)
-        *summary = drape_json_read(text, size, 0, &error);
-    if (text && !*summary && json_error_code(&error) == json_error_out_of_memory)
+        *out = drape_json_read(text, size, 0, &error);
+    if (text && !*out && json_error_code(&error) == json_error_out_of_memory)
         status = drape_fail_memory(ctx, size);
     drape_free(ctx, text);
     drape_free(ctx, path);

@@ -31,9 +31,9 @@ void drape_record_close(drape_record *run); /* does nothing to an empty one */
  * finite). */
 drape_status drape_record_read(const drape_record *run, int64_t frame, double *x);
 
-/* Reads summary.json, to be released by json_decref; *summary is NULL if there is none, as after a kill, or
- * it is not JSON. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_record_summary(const drape_record *run, json_t **summary);
+/* Reads a file of the folder, such as summary.json, to be released by json_decref; *out is NULL if there is
+ * none, as after a kill, or it is not JSON. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_record_json(const drape_record *run, const char *name, json_t **out);
 
 /* Refuses an output that the user names if it is a file of the run in the folder, as drape_file_check_named
  * does. */

@@ -139,6 +139,16 @@ static json_t *warnings(drape_sim *sim)
     return NULL;
 }
 
+json_t *drape_summary_accuracy(const drape_model *model, const drape_accuracy *accuracy)
+{
+    json_t *of = DRAPE_JSON_COUNTS(json_object(), {"node", accuracy->node});
+    of = drape_json_with(of, "reached", json_boolean(accuracy->reached));
+    of = DRAPE_JSON_REALS(of, {"error", accuracy->error}, {"distance", accuracy->distance},
+                          {"worst", accuracy->worst}, {"time", accuracy->time}, {"until", accuracy->until});
+    of = drape_json_with(of, "cloth", drape_json_text(model->cloths[accuracy->cloth].name));
+    return drape_json_with(of, "place", drape_json_numbers(accuracy->place, 3));
+}
+
 static json_t *summary(drape_sim *sim, const drape_summary_def *def)
 {
     const drape_model *model = drape_sim_model(sim);
@@ -186,18 +196,11 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                     {"contact", s.wall_contact}, {"output", def->wall_output});
     object = drape_json_with(object, "wall_s", wall);
     if (accuracy) { /* the estimated error, a share of the diagonal, and what else is known of it */
-        json_t *place = json_array();
-        for (int k = 0; k < 3; k++)
-            place = drape_json_append(place, drape_json_number(accuracy->place[k]));
-        json_t *of = DRAPE_JSON_COUNTS(json_object(), {"runs", accuracy->runs}, {"node", accuracy->node});
-        of = drape_json_with(of, "reached", json_boolean(accuracy->reached));
-        of = DRAPE_JSON_REALS(of, {"asked", accuracy->asked}, {"distance", accuracy->distance},
-                              {"worst", accuracy->worst}, {"time", accuracy->time},
-                              {"until", accuracy->until}, {"earlier_runs_s", accuracy->seconds});
-        of = drape_json_with(of, "cloth", drape_json_text(model->cloths[accuracy->cloth].name));
+        json_t *of = DRAPE_JSON_COUNTS(drape_summary_accuracy(model, accuracy), {"runs", accuracy->runs});
+        of = DRAPE_JSON_REALS(of, {"asked", accuracy->asked}, {"earlier_runs_s", accuracy->seconds});
         of = drape_json_with(of, "method", drape_json_text(accuracy->method));
         object = drape_json_with(object, "accuracy", drape_json_number(accuracy->error));
-        object = drape_json_with(object, "accuracy_of", drape_json_with(of, "place", place));
+        object = drape_json_with(object, "accuracy_of", of);
     }
     json_t *energy = DRAPE_JSON_REALS(json_object(), {"kinetic", e.kinetic}, {"elastic", e.elastic},
                                       {"gravity", e.gravity}, {"contact", e.contact},

@@ -4,7 +4,10 @@
 
 #include "io/folder.h"
 
-#define DRAPE_SUMMARY_NAME "summary.json" /* in the folder of a run */
+#include <jansson.h>
+
+#define DRAPE_SUMMARY_NAME  "summary.json"  /* in the folder of a run */
+#define DRAPE_ACCURACY_NAME "accuracy.json" /* there: of `drape accuracy`, for the report */
 
 /* Frames with a budget: how long they took, and how many ended at each level. */
 typedef struct drape_summary_realtime {
@@ -26,6 +29,9 @@ typedef struct drape_summary_def {
     const drape_summary_realtime *realtime; /* NULL: there was no budget */
     const drape_accuracy *accuracy;         /* NULL: none was asked */
 } drape_summary_def;
+
+/* An estimate of the error of a run: all but `accuracy.runs`, `asked`, `seconds` and `method`. */
+json_t *drape_summary_accuracy(const drape_model *model, const drape_accuracy *accuracy);
 
 /* Writes the file of this name in a folder, or with folder NULL the file at a path that the user named,
  * completely or not at all. Numbers that are not finite become null. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */

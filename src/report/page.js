@@ -133,6 +133,11 @@ function describe() {
     notes.push(`The page has ${run.frames.numbers.length} of ${run.frames.all} frames, at equal intervals; drape report --megabytes N makes room for more.`);
   }
   if (run.steps.every > 1) notes.push(`Of ${run.steps.rows} attempts every ${run.steps.every}th accepted one and all rejected ones are plotted.`);
+  const off = run.accuracy;
+  if (off?.time?.text && off.hash === s?.hash) {
+    element('accuracy').hidden = false;
+    element('accuracy').append(lines('Accuracy', ['time', 'mesh', 'start'].map((name) => [name, off[name]?.text])));
+  } else if (off) notes.push('accuracy.json is not of this run, and left out.');
   element('note').textContent = notes.join(' ');
   element('note').hidden = notes.length === 0;
   if (s) element('summary').append(...summarize(s));

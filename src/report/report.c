@@ -57,6 +57,7 @@ typedef struct page {
     drape_model *model;  /* its scene, compiled again */
     char *scene_text;
     json_t *summary;             /* NULL: the run did not end */
+    json_t *accuracy;            /* by `drape accuracy`; NULL: there is none */
     drape_arena arena;           /* of all arrays */
     int64_t kept;                /* frames in the page */
     int64_t *frame;              /* (kept) their numbers */
@@ -86,7 +87,9 @@ static drape_status read_run(page *p, const char *folder)
     drape_free(ctx, scene);
     if (!status)
         status = drape_record_open(ctx, folder, p->model->node_count, &p->record);
-    return status ? status : drape_record_summary(&p->record, &p->summary);
+    if (!status)
+        status = drape_record_json(&p->record, DRAPE_SUMMARY_NAME, &p->summary);
+    return status ? status : drape_record_json(&p->record, DRAPE_ACCURACY_NAME, &p->accuracy);
 }
 
 /* ---- Fields ---- */
@@ -443,13 +446,15 @@ static drape_status put_json(const page *p, drape_file *file)
                                                      "step", drape_json_numbers(f->step, (size_t)f->width)));
     const char *slash = strrchr(record->folder, '/');
     json_t *json = json_pack(
-        "{s:s, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:{s:I, s:o, s:o}, s:o, s:o, s:o}", "version",
-        drape_version(), "name", drape_json_text(slash && slash[1] ? slash + 1 : record->folder), "scene",
-        drape_json_text(p->scene_text), "summary", p->summary ? json_incref(p->summary) : json_null(),
-        "nodes", (int)model->surface.node_count, "triangles", (int)model->surface.triangle_count,
-        "simulated_triangles", (int)model->triangle_count, "length", drape_json_number(model->length),
-        "pinned", pinned, "colliders", colliders, "frames", "all", (json_int_t)record->frames, "times", times,
-        "numbers", numbers, "fields", fields, "steps", steps, "energies", energies);
+        "{s:s, s:o, s:o, s:o, s:o, s:i, s:i, s:i, s:o, s:o, s:o, s:{s:I, s:o, s:o}, s:o, s:o, s:o}",
+        "version", drape_version(), "name", drape_json_text(slash && slash[1] ? slash + 1 : record->folder),
+        "scene", drape_json_text(p->scene_text), "summary",
+        p->summary ? json_incref(p->summary) : json_null(), "accuracy",
+        p->accuracy ? json_incref(p->accuracy) : json_null(), "nodes", (int)model->surface.node_count,
+        "triangles", (int)model->surface.triangle_count, "simulated_triangles", (int)model->triangle_count,
+        "length", drape_json_number(model->length), "pinned", pinned, "colliders", colliders, "frames", "all",
+        (json_int_t)record->frames, "times", times, "numbers", numbers, "fields", fields, "steps", steps,
+        "energies", energies);
     drape_file_print(file, BLOCK, "run");
     if (!status &&
         (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
@@ -518,6 +523,7 @@ drape_status drape_report_write(drape_context *ctx, const drape_report_def *def,
     drape_folder_close(&folder);
     drape_record_close(&p.record);
     json_decref(p.summary);
+    json_decref(p.accuracy);
     drape_model_destroy(&p.model);
     drape_free(ctx, p.scene_text);
     drape_arena_free(&p.arena);

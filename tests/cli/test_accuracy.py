@@ -2,7 +2,7 @@
 """`drape run --accuracy`: what a run says of itself, against a fine one. See program.py."""
 import json
 
-from program import drape, equal, good, read_json, read_npy, refused, run_tests, scene, text_of, write_json
+from program import drape, equal, good, read_json, read_npy, refused, run_tests, scene, text_of, write_json, write_text
 
 
 def write_scene():
@@ -67,6 +67,64 @@ def test_interrupted_by_a_full_disk():
     write_scene()
     result = drape("run", "scene.json", "--accuracy", "1mm", "--summary", "/dev/full")
     equal(result.returncode, 1)
+
+
+def within_two(estimate, true):
+    """Within a factor of 2: what one refinement can say of an order between 1 and 2, or of one that is taken as 1."""
+    assert true / 2 < estimate < 2 * true, (estimate, true)
+
+
+def furthest(first, second):
+    return max(frame["share"] for frame in json.loads(good("compare", first, second, "--json"))["cloth"][0]["frames"])
+
+
+def test_verdict():
+    """errors in time and by the mesh are within a factor of 2 of those beside fine runs; the report shows the lines, of this run only"""
+    write_scene()
+    good("run", "scene.json", "--out", "run")
+    good("run", "scene.json", "--out", "fine", "--dt", "0.0005")
+    good("run", "scene.json", "--out", "finer_mesh", "--set", "/cloth/0/mesh/subdivide=3")
+    of = json.loads(good("accuracy", "scene.json", "--json"))
+    within_two(of["time"]["error"], furthest("run", "fine"))
+    within_two(of["mesh"]["error"], furthest("run", "finer_mesh"))
+    assert of["start"]["error"] < 1e-3 and of["predictable_until"] == 0.25, of
+    for line in (of["time"], of["mesh"], of["start"]):
+        assert line["reached"] and line["until"] == 0.25 and line["error"] * 0.5 - line["distance"] < 1e-12 <= line["worst"], line
+    equal(of["hash"], read_json("run/summary.json")["hash"])
+    text = good("accuracy", "scene.json")
+    assert text.startswith("cost  four runs, at most 12 times the CPU time of the first"), text
+    equal([line.split()[0] for line in text.splitlines()], ["cost", "cost", "time", "mesh", "start", "cost"])
+    write_json("run/accuracy.json", of)
+    good("report", "run")
+    assert of["mesh"]["text"].replace("<", "\\u003c") in text_of("run/report.html")
+
+
+def test_verdict_of_any_mesh():
+    """a mesh from a file with a hole, and a scene that asks for an accuracy, whose method is the one that reaches it"""
+    ring = "".join(f"v {x} 0 {z}\n" for x, z in ((0, 0), (3, 0), (3, 3), (0, 3), (1, 1), (2, 1), (2, 2), (1, 2)))
+    write_text("ring.obj", ring + "".join(f"f {a} {b} {c}\n" for a, b, c in ((1, 5, 2), (2, 5, 6), (2, 6, 3), (3, 6, 7), (3, 7, 4), (4, 7, 8), (4, 8, 1), (1, 8, 5))))
+    write_json("scene.json", scene(mesh={"file": "ring.obj", "transform": {"scale": 0.1}}, pins=[{"nodes": [0, 1]}], integrator={}, accuracy="2%", duration=0.2))
+    of = json.loads(good("accuracy", "scene.json", "--json"))
+    assert of["within"] == 0.02 and of["time"]["error"] < 0.02 < of["mesh"]["error"] and not of["method"].startswith("be"), of
+
+
+def test_no_verdict():
+    """what has no verdict is one line; a run that fails on the finer mesh leaves the other lines, and exit code 1"""
+    write_scene()
+    for method in ("verlet", "static"):
+        refused("accuracy", "scene.json", "--integrator", method, says="does not converge to the motion")
+    write_json("stops.json", scene(events=[{"type": "height", "height": -0.1, "action": "stop"}]))
+    refused("accuracy", "stops.json", says="no common end")
+    write_json("springs.json", scene(mesh={"grid": "square", "columns": 3, "rows": 3, "width": 1, "height": 1}, terms=[{"type": "spring.structural", "stiffness": 100}]))
+    refused("accuracy", "springs.json", says="is not to be subdivided")
+    write_json("fails.json", scene(mesh={"grid": "square", "columns": 7, "rows": 7, "width": 0.3, "height": 0.3}, pins=[{"edge": "top"}], terms=["stretch.cst", "bend.midedge"],
+                                   material={"fabric": "wang2011_tablecloth"}, controller={"type": "fixed"}, integrator={"max_iterations": 3}, duration=0.3))
+    result = drape("accuracy", "fails.json", "--json")
+    equal((result.returncode, result.stderr.count("accuracy:")), (1, 0))
+    of = json.loads(result.stdout)
+    assert of["time"]["reached"] and not of["mesh"]["reached"] and of["mesh"]["error"] is None and "max_iterations" in of["mesh"]["text"], of
+    result = drape("accuracy", "fails.json", "--set", "/integrator/max_iterations=1")
+    equal((result.returncode, "\ntime" in result.stdout, result.stderr.count("max_iterations")), (1, False, 1))
 
 
 if __name__ == "__main__":
