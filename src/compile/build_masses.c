@@ -45,7 +45,6 @@ drape_status drape_compile_masses(drape_model *model, const char *pointer, const
                                                         .form = &drape_form_mass,
                                                         .mesh = &cloth->mesh,
                                                         DRAPE_SELECTED_BY(item.def),
-                                                        .given = true,
                                                         .take = take_node,
                                                         .user = &item}));
     }

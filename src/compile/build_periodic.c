@@ -66,6 +66,7 @@ static drape_status list_side(const pairing *p, const char *key, const drape_sel
                                        .form = &drape_form_selection,
                                        .mesh = mesh,
                                        DRAPE_SELECTED_BY(def),
+                                       .taken = s->taken,
                                        .take = take_node,
                                        .user = s};
     DRAPE_TRY(drape_arena_status(scratch));

@@ -299,6 +299,7 @@ static drape_status pin_cloth(drape_model *model, const drape_scene_def *def, in
                                                         .form = &drape_form_pin,
                                                         .mesh = &pin->cloth->mesh,
                                                         DRAPE_SELECTED_BY(pin->def),
+                                                        .taken = pin->held + pin->cloth->first_node,
                                                         .take = take_node,
                                                         .user = pin}));
         DRAPE_TRY(list_nodes(pin, to));

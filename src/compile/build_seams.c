@@ -106,7 +106,6 @@ static drape_status list_side(side *s)
                                        .form = &drape_form_seam_side,
                                        .mesh = mesh,
                                        DRAPE_SELECTED_BY(def),
-                                       .given = true,
                                        .take = take_node,
                                        .user = s};
     DRAPE_TRY(drape_arena_status(scratch));

@@ -49,7 +49,7 @@ static drape_status take_box(const drape_selection *s)
             return drape_fail_below(s->ctx, s->pointer, "box", "min must not be above max in any coordinate");
     DRAPE_TRY(drape_check_cancel_after(s->ctx, 8 * (size_t)s->mesh->node_count));
     int32_t taken = 0;
-    const int32_t count = s->given ? drape_mesh_given(s->mesh)->node_count : s->mesh->node_count;
+    const int32_t count = s->taken ? s->mesh->node_count : drape_mesh_given(s->mesh)->node_count;
     for (int32_t i = 0; i < count; i++) {
         const double *x = s->mesh->x + 3 * (size_t)i;
         bool inside = true;
@@ -103,36 +103,17 @@ static drape_status select_given(const drape_selection *s)
     return take_range(s, "row", s->row, s->row, 0, s->mesh->columns - 1);
 }
 
-/* What a selection has taken of a mesh that is subdivided. */
-typedef struct spread {
-    const drape_selection *of;
-    uint8_t *taken; /* (node_count) */
-} spread;
-
-static drape_status take_and_mark(void *user, const char *key, int32_t local)
-{
-    const spread *p = user;
-    p->taken[local] = 1;
-    return p->of->take(p->of->user, key, local);
-}
-
 drape_status drape_select_nodes(const drape_selection *s)
 {
     const drape_mesh *mesh = s->mesh;
-    if (s->given || !mesh->given)
-        return select_given(s);
-    spread p = {s, drape_alloc(s->ctx, (size_t)mesh->node_count, 1)};
-    drape_selection marked = *s;
-    marked.take = take_and_mark;
-    marked.user = &p;
-    drape_status status = p.taken ? select_given(&marked) : DRAPE_E_MEMORY;
-    for (int32_t i = mesh->given->node_count; i < mesh->node_count && !status; i++) {
-        const int32_t *between = mesh->parent + 2 * (size_t)(i - mesh->given->node_count);
-        if (!p.taken[i] && p.taken[between[0]] && p.taken[between[1]])
-            status = take_and_mark(&p, "nodes", i);
+    const int32_t first = drape_mesh_given(mesh)->node_count;
+    DRAPE_TRY(select_given(s));
+    for (int32_t i = first; s->taken && i < mesh->node_count; i++) {
+        const int32_t *between = mesh->parent + 2 * (size_t)(i - first);
+        if (!s->taken[i] && s->taken[between[0]] && s->taken[between[1]])
+            DRAPE_TRY(s->take(s->user, "nodes", i));
     }
-    drape_free(s->ctx, p.taken);
-    return status;
+    return DRAPE_OK;
 }
 
 int drape_compare_along(const void *a, const void *b)

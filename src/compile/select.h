@@ -20,8 +20,9 @@ typedef struct drape_selection {
     int32_t row;
     bool has_box;
     const double *box_min, *box_max;
-    bool given; /* of a subdivided mesh: only nodes that its source has. If not, nodes between selected ones
-                   are selected, too, after these */
+    const uint8_t
+        *taken; /* (nodes of the mesh) 1: take has taken it. Then nodes between these are taken, too,
+                             if the mesh is subdivided. NULL: only nodes that its source has */
     drape_select_take *take;
     void *user;
 } drape_selection;

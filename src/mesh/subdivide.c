@@ -5,66 +5,51 @@
 
 #include <string.h>
 
-/* One more node in the middle of each edge, as the next level of parents. */
-static drape_status add_nodes(drape_mesh *mesh)
-{
-    drape_arena *arena = &mesh->arena;
-    const size_t nodes = (size_t)mesh->node_count, edges = (size_t)mesh->edge_count,
-                 before = nodes - (size_t)mesh->given->node_count;
-    double *x = drape_arena_take(arena, nodes + edges, 3 * sizeof *x);
-    int32_t *parent = drape_arena_take(arena, before + edges, 2 * sizeof *parent);
-    if (!x || !parent)
-        return DRAPE_E_MEMORY;
-    memcpy(x, mesh->x, 3 * nodes * sizeof *x);
-    if (before > 0)
-        memcpy(parent, mesh->parent, 2 * before * sizeof *parent);
-    memcpy(parent + 2 * before, mesh->edge, 2 * edges * sizeof *parent);
-    mesh->x = x;
-    mesh->parent = parent;
-    mesh->node_count += mesh->edge_count;
-    drape_mesh_fill_middles(mesh, mesh->x);
-    return DRAPE_OK;
-}
-
 static drape_status split(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
 {
-    const size_t triangles = (size_t)mesh->triangle_count;
-    const int32_t first = mesh->node_count;
-    if ((int64_t)mesh->node_count + mesh->edge_count > DRAPE_MAX_NODES)
+    const size_t nodes = (size_t)mesh->node_count, edges = (size_t)mesh->edge_count,
+                 triangles = (size_t)mesh->triangle_count, parents = nodes - (size_t)mesh->given->node_count;
+    if (nodes + edges > DRAPE_MAX_NODES)
         return drape_mesh_fail(ctx, source, 0, "subdivided, it has more than %d nodes", DRAPE_MAX_NODES);
-    DRAPE_TRY(add_nodes(mesh));
-    int32_t *piece = drape_arena_take(&mesh->arena, 4 * triangles, 3 * sizeof *piece);
-    if (!piece)
+    double *x = drape_arena_resize(&mesh->arena, mesh->x, nodes + edges, 3 * sizeof *x);
+    mesh->x = x ? x : mesh->x;
+    int32_t *parent = drape_arena_resize(&mesh->arena, mesh->parent, parents + edges, 2 * sizeof *parent),
+            *piece = drape_arena_take(&mesh->arena, 4 * triangles, 3 * sizeof *piece);
+    if (!x || !parent || !piece)
         return DRAPE_E_MEMORY;
+    memcpy(parent + 2 * parents, mesh->edge, 2 * edges * sizeof *parent);
     for (size_t t = 0; t < triangles; t++)
         for (size_t k = 0; k < 3; k++) {
             int32_t *of = piece + 12 * t;
-            const int32_t middle = first + mesh->triangle_edge[3 * t + k];
+            const int32_t middle = mesh->node_count + mesh->triangle_edge[3 * t + k];
             of[3 * k + k] = mesh->triangle[3 * t + k];
             of[3 * k + (k + 1) % 3] = middle;
             of[3 * ((k + 1) % 3) + k] = middle;
             of[9 + k] = middle;
         }
-    mesh->triangle = piece;
-    mesh->triangle_count *= 4;
     drape_mesh_drop_topology(mesh);
     drape_arena_release(&mesh->arena, mesh->edge);
+    mesh->parent = parent;
+    mesh->triangle = piece;
+    mesh->node_count += mesh->edge_count;
+    mesh->triangle_count *= 4;
+    drape_mesh_fill_middles(mesh, mesh->x);
     return drape_mesh_connect(ctx, source, mesh);
 }
 
 drape_status drape_mesh_subdivide(drape_context *ctx, const drape_mesh_source *source, int times,
                                   drape_mesh *mesh)
 {
-    if (times > 0 && !(mesh->given = drape_arena_take(&mesh->arena, 1, sizeof *mesh->given)))
-        return DRAPE_E_MEMORY;
     mesh->subdivided = times;
-    if (times > 0) {
-        *mesh->given = (drape_mesh){.node_count = mesh->node_count,
-                                    .triangle_count = mesh->triangle_count,
-                                    .triangle = mesh->triangle,
-                                    .faces = mesh->faces};
-        mesh->faces = (drape_faces){0};
-    }
+    if (times == 0)
+        return DRAPE_OK;
+    if (!(mesh->given = drape_arena_take(&mesh->arena, 1, sizeof *mesh->given)))
+        return DRAPE_E_MEMORY;
+    *mesh->given = (drape_mesh){.node_count = mesh->node_count,
+                                .triangle_count = mesh->triangle_count,
+                                .triangle = mesh->triangle,
+                                .faces = mesh->faces};
+    mesh->faces = (drape_faces){0};
     for (int i = 0; i < times; i++) {
         DRAPE_TRY(drape_check_cancel(ctx));
         DRAPE_TRY(split(ctx, source, mesh));
