@@ -12,12 +12,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define WITHIN             1e-2
-#define ROUNDING           1e-9 /* of the duration */
-#define FINER              0.5  /* q of steps, and of edges */
-#define TIGHTER            0.1  /* q of tolerances, and 1 / (1 - q^p) of these */
-#define TIGHTER_SHARE      1.25
-#define TIGHTER_SHARE_HITS 1.46
+#define WITHIN   1e-2
+#define ROUNDING 1e-9  /* of the duration */
+#define FINER    0.5   /* steps, and edges */
+#define TIGHTER  0.1   /* tolerances */
+#define ESTIMATE 1.414 /* of the error, times the distance */
 
 typedef struct judge {
     drape_context *ctx;
@@ -84,25 +83,12 @@ static drape_status watch(void *user, const drape_event *event)
     return j->late || j->parted ? 1 : DRAPE_OK;
 }
 
-/* The error of the run over its distance from the present one. All methods are of order 1 where contacts
- * change. Of a tenth of a tolerance .2 of the error are left and, with contact, .32 (as in refinement.c).
- * Linear triangles are of order 2 where strain is smooth, but it is not at pins of single nodes, at folds and
- * contacts: their order is taken as 1. */
-static double error_over_distance(const judge *j)
-{
-    const bool hits = j->model->collider_count > 0 || j->model->contact.self;
-    if (j->number == DRAPE_ASSESS_BY_START)
-        return 1;
-    if (j->number == DRAPE_ASSESS_BY_TIME && j->controlled)
-        return hits ? TIGHTER_SHARE_HITS : TIGHTER_SHARE;
-    return 1 / (1 - ldexp(1, j->number == DRAPE_ASSESS_BY_MESH || hits ? -1 : -j->chosen.integrator->order));
-}
-
 static void fill(const judge *j, drape_accuracy *by)
 {
     const int32_t c = drape_deviation_worst(&j->apart);
     const drape_deviation_cloth *cloth = &j->apart.cloths[c];
-    const double share = j->frame > 1 ? error_over_distance(j) : NAN; /* the first frame is the start */
+    const double most = j->number == DRAPE_ASSESS_BY_START ? 1 : ESTIMATE,
+                 share = j->frame > 1 ? most : NAN; /* the first frame is the start */
     by->distance = share * cloth->largest.rms;
     by->error = by->distance / cloth->diagonal;
     by->worst = share * cloth->largest.distance;

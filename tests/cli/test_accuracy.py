@@ -70,7 +70,7 @@ def test_interrupted_by_a_full_disk():
 
 
 def within_two(estimate, true):
-    """Within a factor of 2: what one refinement can say of an order between 1 and 2, or of one that is taken as 1."""
+    """Within a factor of 2: sqrt(2) times the distance, for any order from 0.63 on (accuracy/assess.h)."""
     assert true / 2 < estimate < 2 * true, (estimate, true)
 
 
