@@ -88,7 +88,7 @@ static void fill(const judge *j, drape_accuracy *by)
     const int32_t c = drape_deviation_worst(&j->apart);
     const drape_deviation_cloth *cloth = &j->apart.cloths[c];
     const double most = j->number == DRAPE_ASSESS_BY_START ? 1 : ESTIMATE,
-                 share = j->frame > 1 ? most : NAN; /* the first frame is the start */
+                 share = j->apart.frames > 1 ? most : NAN; /* the first frame is the start */
     by->distance = share * cloth->largest.rms;
     by->error = by->distance / cloth->diagonal;
     by->worst = share * cloth->largest.distance;
@@ -128,12 +128,13 @@ static drape_status make_run(judge *j, int number, const drape_model *model, dou
         return status;
     fill(j, &j->out->by[number]);
     j->out->by[number].seconds = seconds;
-    j->out->by[number].reached = !status && !j->late;
+    j->out->by[number].reached = !status && !j->late && j->apart.frames > 1;
     if (j->late)
         snprintf(j->out->why[number], DRAPE_MESSAGE_SIZE,
                  "it takes more than %d times the CPU time of the run", DRAPE_ASSESS_COST);
-    else if (status)
-        snprintf(j->out->why[number], DRAPE_MESSAGE_SIZE, "%s", drape_context_message(j->ctx));
+    else
+        snprintf(j->out->why[number], DRAPE_MESSAGE_SIZE, "%s",
+                 status ? drape_context_message(j->ctx) : "no frame but the start can be compared");
     return DRAPE_OK;
 }
 

@@ -83,6 +83,7 @@ static drape_status begin(void *user, drape_sim *sim, int number, const drape_as
         say(a, "cost  %.3g s of CPU time for the run, at most %.3g s for the other three\n", so_far->seconds,
             fmax(DRAPE_ASSESS_LEAST, (DRAPE_ASSESS_COST - 1) * so_far->seconds));
     cli_progress_begin(&a->progress, sim, so_far->until);
+    cli_progress_hide(&a->progress);
     for (int i = 0; i < RUNS && a->progress.on; i++)
         if (lines[i].number == number)
             fprintf(stderr, "%s\n", lines[i].name);

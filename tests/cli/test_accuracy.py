@@ -117,6 +117,8 @@ def test_no_verdict():
     refused("accuracy", "stops.json", says="no common end")
     write_json("springs.json", scene(mesh={"grid": "square", "columns": 3, "rows": 3, "width": 1, "height": 1}, terms=[{"type": "spring.structural", "stiffness": 100}]))
     refused("accuracy", "springs.json", says="is not to be subdivided")
+    result = drape("accuracy", "scene.json", "--duration", "0.01")
+    equal((result.returncode, result.stdout.count("not known: no frame but the start")), (1, 3))
     write_json("fails.json", scene(mesh={"grid": "square", "columns": 7, "rows": 7, "width": 0.3, "height": 0.3}, pins=[{"edge": "top"}], terms=["stretch.cst", "bend.midedge"],
                                    material={"fabric": "wang2011_tablecloth"}, controller={"type": "fixed"}, integrator={"max_iterations": 3}, duration=0.3))
     result = drape("accuracy", "fails.json", "--json")
