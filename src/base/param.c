@@ -204,6 +204,19 @@ const char *drape_number_text(double number, char text[DRAPE_NUMBER_SIZE])
     return text;
 }
 
+const char *drape_number_read(const char *text, double *number)
+{
+    char *end;
+    const locale_t old = drape_locale_enter();
+    *number = strtod(text, &end);
+    if (end > text && *end == '/') {
+        text = end + 1;
+        *number /= strtod(text, &end);
+    }
+    drape_locale_leave(old);
+    return end > text && isfinite(*number) ? end : NULL;
+}
+
 /* The same with the exponent as people write it. */
 static const char *given_text(double number, char text[DRAPE_NUMBER_SIZE])
 {

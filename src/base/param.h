@@ -65,6 +65,10 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
 const char *drape_number_text(double number, char text[DRAPE_NUMBER_SIZE]);
 #define DRAPE_NUMBER_TEXT(number) drape_number_text(number, (char[DRAPE_NUMBER_SIZE]){0})
 
+/* Reads the number that a text begins with, "0.005" or a fraction "1/240", in any locale. Returns what
+ * follows it; NULL: it begins with none, or with one that is not finite, such as "1/0". */
+const char *drape_number_read(const char *text, double *number);
+
 /* Returns the candidate nearest to word by edit distance; NULL if none is close enough to be a plausible
  * misspelling. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);

@@ -1,10 +1,10 @@
 /* cmd_path.c: `drape path`: the equilibria of a scene as its loads grow; a table, and a frame of each. */
 #include "cli/shapes.h"
 
+#include "base/param.h"
 #include "drape/lab.h"
 #include "io/csv.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -84,12 +84,8 @@ static drape_status observe(void *user, drape_sim *sim, const drape_path_point *
 
 static bool read_number(const char *text, double *value)
 {
-    char *end = NULL;
-    if (!text)
-        return true;
-    errno = 0;
-    *value = strtod(text, &end);
-    return end != text && *end == 0 && errno == 0 && isfinite(*value);
+    const char *rest = text ? drape_number_read(text, value) : "";
+    return rest && *rest == 0;
 }
 
 /* The node numbers of --node count through all cloths. */

@@ -1,6 +1,7 @@
 /* cmd_render.c: `drape render`: draws pictures and films of scenes and finished runs. */
 #include "cli/cli.h"
 
+#include "base/param.h"
 #include "io/export.h"
 #include "io/scene_copy.h"
 #include "render/film.h"
@@ -82,14 +83,10 @@ typedef struct render {
 static bool read_numbers(const char *text, double *values, int min, int max)
 {
     int count = 0;
-    char *end;
-    for (; count < max; text = end + 1) {
-        values[count] = strtod(text, &end);
-        if (end == text || !isfinite(values[count]))
-            return false;
+    while (count < max && (text = drape_number_read(text, &values[count]))) {
         count++;
-        if (*end != ',')
-            return *end == 0 && count >= min;
+        if (*text++ != ',')
+            return text[-1] == 0 && count >= min;
     }
     return false;
 }

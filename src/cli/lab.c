@@ -2,6 +2,7 @@
 #include "cli/lab.h"
 
 #include "base/arena.h"
+#include "base/param.h"
 #include "drape/lab.h"
 
 #include <limits.h>
@@ -36,8 +37,8 @@ static int read_texts(const cli_lab_request *request, double default_minutes, dr
     if (budget && strcmp(budget, "none") == 0) {
         minutes = 0;
     } else if (budget) {
-        minutes = strtod(budget, &end);
-        if (end == budget || *end || !(minutes > 0 && minutes < 1e9))
+        const char *rest = drape_number_read(budget, &minutes);
+        if (!rest || *rest || !(minutes > 0 && minutes < 1e9))
             return cli_misuse(request->command.verb, "--budget \"%.60s\": must be minutes, above 0, or none",
                               budget);
     }

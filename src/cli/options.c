@@ -231,9 +231,8 @@ static int set_option(cli_command *command, const cli_option *option, const char
                    : CLI_GO_ON;
     }
     case CLI_REAL: {
-        const double number = strtod(argument, &end);
-        *(double *)value = number;
-        return end == argument || *end || !(number > 0 && number < 1e300)
+        const char *rest = drape_number_read(argument, value);
+        return !rest || *rest || !(*(double *)value > 0 && *(double *)value < 1e300)
                    ? cli_misuse(command->verb, "--%s \"%.60s\": must be a number above 0", option->name,
                                 argument)
                    : CLI_GO_ON;

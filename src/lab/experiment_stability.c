@@ -73,7 +73,6 @@ static drape_status wrong_axis(lab *l, const char *text, const char *why)
 static drape_status read_axis(lab *l, const char *text, axis *a)
 {
     const char *equals = strchr(text, '=');
-    int used = 0;
     char rest[8] = "";
     if (*text != '/' || !equals || (size_t)(equals - text) >= sizeof a->pointer)
         return wrong_axis(l, text, "a pointer is needed");
@@ -82,13 +81,14 @@ static drape_status read_axis(lab *l, const char *text, axis *a)
     if (drape_is_retired(a->pointer))
         return wrong_axis(l, text, "the setting has no effect any more");
     lab_axis *ends = &a->ends;
-    if (sscanf(equals + 1, "%lf:%lf:%d%n%7s", &ends->from, &ends->to, &a->count, &used, rest) < 3 ||
-        used == 0)
+    const char *at = drape_number_read(equals + 1, &ends->from);
+    at = at && *at == ':' ? drape_number_read(at + 1, &ends->to) : NULL;
+    if (!at || sscanf(at, ":%d%7s", &a->count, rest) < 1)
         return wrong_axis(l, text, "three numbers are needed");
     ends->log = strcmp(rest, "log") == 0;
     if (*rest && !ends->log)
         return wrong_axis(l, text, "only log may follow the count");
-    if (!isfinite(ends->from) || !isfinite(ends->to) || ends->from == ends->to)
+    if (ends->from == ends->to)
         return wrong_axis(l, text, "from and to must be different numbers");
     if (ends->log && !(ends->from > 0 && ends->to > 0))
         return wrong_axis(l, text, "a logarithmic axis needs positive numbers");

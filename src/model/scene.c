@@ -317,10 +317,14 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
 }
 
 /* Parses a number in forms that people write and JSON does not allow: ".5", "-.5", "+5", "5." and these with
- * an exponent. Returns NULL if the text is not a number. */
+ * an exponent, and fractions of numbers, "1/240". Returns NULL if the text is not a number. */
 static json_t *loose_number(const char *text, json_error_t *error)
 {
     char number[MAX_NUMBER + 3];
+    double quotient;
+    const char *rest = strchr(text, '/') ? drape_number_read(text, &quotient) : NULL;
+    if (rest && *rest == 0)
+        return json_real(quotient);
     const size_t digits = strspn(text, "+-"), length = strlen(text);
     if (length > MAX_NUMBER || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
         return NULL;

@@ -92,6 +92,19 @@ def test_unknown_names():
         assert meant is None or f'did you mean "{meant}"?' in line, f"{args}: {line}"
 
 
+def test_fractions():
+    """a fraction is a number wherever one is read, and one that is none is refused in one line"""
+    write_scene()
+    assert "10 accepted, 0 rejected; 0.005 to 0.005 s" in good("run", "scene.json", "--dt", "1/200", "--duration", "1/20", "--set", "/integrator/method=be")
+    for args, says in ((["run", "--dt", "1/0"], '/integrator/dt: "1/0" is not allowed; dt is a number in (0, 1e6] s'),
+                       (["run", "--dt", "a/b"], '/integrator/dt: "a/b" is not allowed'), (["run", "--duration", "1/"], '/duration: "1/" is not allowed'),
+                       (["run", "--accuracy", "1/0"], '/accuracy: is "1/0"; it must be a length'), (["render", "--camera", "1/0,2"], "--camera"),
+                       (["converge", "--case-seconds", "1/-2"], "--case-seconds \"1/-2\": must be a number above 0"),
+                       (["tradeoff", "--budget", "1/0"], '--budget "1/0": must be minutes'),
+                       (["stability", "--axis", "/integrator/dt=1/60:1/:3"], "three numbers are needed")):
+        refused(args[0], "scene.json", *args[1:], says=says)
+
+
 def test_wrong_usage():
     """wrong command lines are one line, exit 2, and write nothing"""
     write_scene()

@@ -556,7 +556,8 @@ TEST(test_set_loose_numbers)
     static const struct {
         const char *text;
         double value;
-    } numbers[] = {{".02", 0.02}, {"+.5", 0.5}, {"+2", 2}, {"5.", 5}, {"1.e-2", 0.01}, {"1.5E+1", 15}};
+    } numbers[] = {{".02", 0.02},  {"+.5", 0.5},         {"+2", 2},     {"5.", 5}, {"1.e-2", 0.01},
+                   {"1.5E+1", 15}, {"1/240", 1.0 / 240}, {".5/2", 0.25}};
     open_context();
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
