@@ -17,7 +17,8 @@
 
 DRAPE_C_BEGIN
 
-/* A value of the scene, as for drape_scene_set: a JSON pointer and a JSON text. */
+/* A value of the scene, as for drape_scene_set: a JSON pointer and a JSON text. Of /integrator/dt and
+ * /integrator/rtol a tradeoff takes the values that it compares, "1/60,1/240". */
 typedef struct drape_lab_setting {
     const char *pointer, *value; /* "/integrator/dt", "0.01" */
 } drape_lab_setting;
@@ -47,14 +48,14 @@ typedef struct drape_lab_def {
     double strain_limit;               /* stability: a result in which an edge is strained by more counts as
                                           unphysical; default 0.2 */
     double case_seconds; /* [s] CPU time of a case, after which it is stopped as over budget; default 30 */
-    int repeats;         /* tradeoff: runs per case, of which the smallest CPU time counts; default 3 */
+    int repeats;         /* tradeoff: runs per short case, of which the least CPU time counts; default 3 */
     int jobs;            /* threads, 1 to 256; default 1, because cases that run side by side slow each other
                             down */
     int shard, shards;   /* this shard runs the cases whose number is shard - 1 modulo shards; default 1 of
                             1 */
     double
         budget_seconds; /* tradeoff: [s] wall-clock time of the call, after which the cases that are left are
-                              left out, the least telling ones; the reference takes at most half; default 0:
+                              left out, the dearest ones; the reference takes at most half; default 0:
                               none is left out */
     drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
@@ -92,7 +93,7 @@ DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 /* Runs "tradeoff", "stability", "converge" or "ivp" and writes cases.jsonl, experiment.json, results.csv,
  * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
  * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
- * same experiment are kept as they are. With def->plan it runs a sample and writes plan.json, and no figures
+ * same experiment are kept as they are; a tradeoff that is not a shard may have other cases each time. With def->plan it runs a sample and writes plan.json, and no figures
  * and page. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
  * setting that no case uses, a folder that holds another experiment), those of loading the scene,
  * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was, but for

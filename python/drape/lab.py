@@ -19,7 +19,7 @@ def _experiment(verb: str, scene: AnyScene, out, options: Mapping[str, Any], nam
 
 
 def tradeoff(scene: AnyScene, *, out=None, **options: Any) -> Table:
-    """Cost and accuracy of all integrators against a precise reference. Options are those of `drape tradeoff --help`: integrators=["be", "ida"], jobs=2,
+    """Cost and accuracy of integrators against a precise reference. Options are those of `drape tradeoff --help`: integrators=["be", "ida"], jobs=2,
     budget=1 (minutes), duration=0.2 [s], set={"/integrator/tolerance": 1e-8} ..."""
     return _experiment("tradeoff", scene, out, options)
 

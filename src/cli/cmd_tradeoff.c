@@ -7,10 +7,9 @@ static const cli_option options[] = {
     CLI_LAB_OPTIONS,
     CLI_LAB_OPTION("repeats", CLI_NUMBER, "N",
                    "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
-    CLI_LAB_OPTION(
-        "budget", CLI_TEXT, "MINUTES",
-        "limit of wall-clock time, or none; the least informative cases are left out and named (default 5)",
-        budget, 0),
+    CLI_LAB_OPTION("budget", CLI_TEXT, "MINUTES",
+                   "limit of wall-clock time, or none; the dearest cases are left out and named (default 5)",
+                   budget, 0),
 };
 
 static int run(const void *request)
@@ -20,13 +19,17 @@ static int run(const void *request)
 
 const drape_verb drape_verb_tradeoff = {
     .entry = {.name = "tradeoff",
-              .summary = "compare the cost and the accuracy of all integrators, against a precise reference"},
+              .summary = "find the cheapest method and step for an accuracy, against a precise reference"},
     .operand = "SCENE",
     .takes_scene = true,
     .details =
-        "Runs a scene with every integrator over its dt or rtol, and compares with a reference "
-        "solution whose\n"
-        "own error is estimated. After Ctrl-C, or where cases were left out, the same command continues.\n"
+        "Runs a scene by newton_k, bdf2 and rosenbrock over dt and rtol, or by --integrators at --dt "
+        "1/60,1/240\n"
+        "and --set /integrator/rtol=1e-3,1e-4, and compares with a reference whose own error is estimated. "
+        "After\n"
+        "Ctrl-C, or where cases were left out, the same command continues; with other integrators and "
+        "values, "
+        "too.\n"
         "Cases run one at a time, so that their CPU times can be compared; --jobs runs several.",
     CLI_OPTIONS(options, cli_lab_request),
     .run = run,

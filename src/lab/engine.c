@@ -36,15 +36,33 @@ static bool ends_in(const char *name, const char *ending)
     return length > end && strcmp(name + length - end, ending) == 0;
 }
 
+/* In a folder whose cases may change, gives a line the number that the case with its tags has now, or sets it
+ * aside: it is kept for a call that asks for that case again. Takes the reference; NULL: it was set aside. */
+static json_t *renumber(lab *l, json_t *line)
+{
+    json_t *tags = json_object_get(line, "tags"), *one;
+    size_t i;
+    if (!l->experiment->grows || !json_is_object(tags))
+        return line;
+    json_array_foreach(l->cases, i, one) if (json_equal(tags, json_object_get(one, "tags")))
+    {
+        json_object_set_new(line, "case", json_integer((json_int_t)i));
+        return line;
+    }
+    json_array_append_new(l->others, line);
+    return NULL;
+}
+
 /* Takes a line of a file as a result, if its case has none yet. */
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
     json_error_t fault;
     json_t *line = drape_json_read(text, strlen(text), JSON_REJECT_DUPLICATES, &fault);
-    drape_status status = !line && json_error_code(&fault) == json_error_out_of_memory
-                              ? drape_fail_memory(l->ctx, strlen(text))
-                              : lab_check_line(l, path, number, line, &fault);
-    json_t **result = status ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
+    drape_status status =
+        !line && json_error_code(&fault) == json_error_out_of_memory ? drape_fail_memory(l->ctx, strlen(text))
+        : line && !(line = renumber(l, line))                        ? DRAPE_OK
+                                              : lab_check_line(l, path, number, line, &fault);
+    json_t **result = status || !line ? NULL : &l->results[json_integer_value(json_object_get(line, "case"))];
     if (result && !*result) {
         *result = json_incref(line);
         ++*found;
@@ -88,6 +106,8 @@ static drape_status begin_lines(lab *l, const char *name, int shard, int shards,
     for (size_t i = 0; !status && i < l->count; i++)
         if (l->results[i] && i % (size_t)shards == (size_t)(shard - 1))
             lab_put_line(file, l->results[i]);
+    for (size_t i = 0; !status && shard == 1 && i < json_array_size(l->others); i++)
+        lab_put_line(file, json_array_get(l->others, i));
     return status;
 }
 
@@ -245,17 +265,15 @@ static drape_status sweep_cases(lab *l)
 static drape_status plan(lab *l)
 {
     char digits[17];
-    json_t *settings = json_array();
-    for (size_t i = 0; i < l->def->setting_count; i++)
-        json_array_append_new(settings,
-                              json_pack("[s,s]", l->def->settings[i].pointer, l->def->settings[i].value));
-    l->about = json_pack("{s:s, s:s, s:o, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->entry.name,
+    l->about = json_pack("{s:s, s:s, s:o, s:s, s:[], s:{}, s:[]}", "experiment", l->experiment->entry.name,
                          "drape", drape_version(), "scene", drape_json_text(l->def->scene), "scene_hash", "",
-                         "settings", settings, "arguments", "cases");
+                         "settings", "arguments", "cases");
+    json_t *settings = json_object_get(l->about, "settings");
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
-    if (!l->cases || !l->arguments)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
+    l->others = json_array();
+    if (!l->cases || !l->others)
+        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for an experiment");
     for (size_t i = 0; i < l->def->integrator_count; i++) {
         const char *name = l->def->integrators[i];
         int k;
@@ -266,13 +284,16 @@ static drape_status plan(lab *l)
                               l->experiment->entry.name);
     }
     DRAPE_TRY(l->experiment->plan(l));
+    for (size_t i = 0; i < l->def->setting_count; i++)
+        if (json_array_append_new(settings,
+                                  json_pack("[s,s]", l->def->settings[i].pointer, l->def->settings[i].value)))
+            return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "the settings are not UTF-8, or there is no memory");
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
     if (l->experiment->compares_costs)
         json_object_set_new(l->arguments, "repeats", json_integer(l->def->repeats));
     DRAPE_TRY(lab_check_about(l->ctx, "the plan", l->about));
     /* Lines of a scene that was changed since do not belong to this experiment. */
-    const json_t *first = json_array_get(l->cases, 0);
-    const lab_request request = {.def = l->def, .identified = json_object_get(first, "settings")};
+    const lab_request request = {.def = l->def, .identified = lab_identified(l)};
     DRAPE_TRY(lab_identify(l->ctx, &request, digits));
     return json_object_set_new(l->about, "scene_hash", json_string(digits))
                ? drape_fail_memory(l->ctx, sizeof digits)
@@ -339,12 +360,16 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
     return status ? status : lab_check_about(l->ctx, path, *about);
 }
 
-/* Whether the cases are the same: what the figures show may differ. */
-static bool is_same(const json_t *a, const json_t *b)
+/* Whether the cases are the same, or may differ; what the figures show may. */
+static bool is_same(const json_t *a, const json_t *b, bool of_cases)
 {
     json_t *x = json_copy((json_t *)(uintptr_t)a), *y = json_copy((json_t *)(uintptr_t)b);
     json_object_del(x, "results");
     json_object_del(y, "results");
+    if (!of_cases)
+        json_object_del(x, "cases");
+    if (!of_cases)
+        json_object_del(y, "cases");
     const bool same = json_equal(x, y);
     json_decref(x);
     json_decref(y);
@@ -382,7 +407,7 @@ static drape_status claim_folder(lab *l)
     if (!l->claimed) {
         json_t *there = NULL;
         status = parse_about(l, l->folder, &there);
-        if (!status && !is_same(there, l->about))
+        if (!status && !is_same(there, l->about, !l->experiment->grows || l->def->shards > 1))
             status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                                 "\"%.400s\" holds another experiment, or this one of another scene or "
                                 "version; name another folder, or remove it",
@@ -427,20 +452,14 @@ static const char *group_of(const json_t *one)
     return *scene ? scene : lab_tag_text(one, "series");
 }
 
-/* Writes which cases have no result because the budget was used up, by group. Returns their number. */
-static int64_t list_left_out(lab *l)
+/* Writes which cases have no result because the budget was used up, by group. */
+static void list_left_out(lab *l)
 {
-    const double budget = l->def->budget_seconds;
-    int64_t all = 0;
-    for (size_t i = 0; budget > 0 && i < l->count; i++)
-        all += !l->results[i];
-    if (all == 0)
-        return 0;
+    const char *comma = " ";
     fprintf(l->summary,
             "%lld of %zu cases were left out, as the budget of %.3g minutes was used up; the same command "
             "continues with them. Left out:",
-            (long long)all, l->count, budget / 60);
-    const char *comma = " ";
+            (long long)l->outcome->left_out, l->count, l->def->budget_seconds / 60);
     for (size_t i = 0, end; i < l->count; i = end) {
         const char *series = group_of(json_array_get(l->cases, i));
         int64_t missing = 0;
@@ -451,8 +470,19 @@ static int64_t list_left_out(lab *l)
             comma = ", ";
         }
     }
-    fprintf(l->summary, ". What follows is about the cases that were run.\n");
-    return all;
+    fprintf(l->summary, ".\n");
+}
+
+/* The cases of which there are results, and the rest. */
+static void count_cases(lab *l)
+{
+    const drape_lab_outcome *outcome = l->outcome;
+    fprintf(l->summary,
+            "%lld of %lld cases done; %lld of them did not complete; %lld steps were rejected in all\n",
+            (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
+            (long long)outcome->rejected);
+    if (outcome->left_out)
+        list_left_out(l);
 }
 
 /* Shards leave the report to the merge: several at once in one folder would write the same files. */
@@ -476,20 +506,21 @@ static drape_status report(lab *l)
             outcome->rejected += json_integer_value(json_object_get(l->results[i], "rejected"));
         }
     }
-    fprintf(l->summary,
-            "%lld of %lld cases done; %lld of them did not complete; %lld steps were rejected in all\n",
-            (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
-            (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
-    if (!status && l->def->plan > 0)
+    const bool plans = !status && l->def->plan > 0;
+    if (!status && !shard && !plans && l->def->budget_seconds > 0)
+        outcome->left_out = outcome->cases - outcome->done;
+    const bool whole = !status && !shard && outcome->done + outcome->left_out == outcome->cases;
+    if (whole && !plans)
+        status = l->experiment->report(l);
+    count_cases(l);
+    if (plans)
         return lab_write_plan(l);
-    outcome->left_out = status || shard ? 0 : list_left_out(l);
-    if (status || shard || outcome->done + outcome->left_out < outcome->cases) {
+    if (!whole) {
         fprintf(l->summary,
                 "the report is made once all cases are done: run the other shards, or `drape merge`\n");
         return status;
     }
-    status = l->experiment->report(l);
     snprintf(title, sizeof title, "drape %s: %.400s", l->experiment->entry.name, lab_text(l->about, "scene"));
     drape_make_printable(title);
     if (!status)
@@ -537,6 +568,7 @@ static void end(lab *l)
     for (size_t i = 0; l->results && i < l->count; i++)
         json_decref(l->results[i]);
     json_decref(l->about);
+    json_decref(l->others);
     drape_folder_close(&l->out);
     drape_arena_free(&l->arena);
 }
@@ -620,6 +652,7 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
         status = parse_about(&l, folders[0], &l.about);
     l.cases = json_object_get(l.about, "cases");
     l.arguments = json_object_get(l.about, "arguments");
+    l.others = json_array();
     if (!status)
         status = find(&l, lab_text(l.about, "experiment"));
     if (!status)
@@ -629,7 +662,7 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
     for (size_t i = 0; !status && i < count; i++) {
         json_t *about = NULL;
         status = parse_about(&l, folders[i], &about);
-        if (!status && !is_same(about, l.about))
+        if (!status && !is_same(about, l.about, true))
             status = drape_fail(ctx, DRAPE_E_ARGUMENT, "\"%.300s\" and \"%.300s\" hold different experiments",
                                 folders[0], folders[i]);
         json_decref(about);

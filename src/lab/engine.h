@@ -37,9 +37,10 @@ typedef struct lab_request {
     const json_t *identified;   /* settings with which it has that identity; NULL: none */
     const json_t *settings;     /* {pointer: value} of the case; NULL: none */
     const lab_trace *reference; /* NULL or no frames: nothing to compare with */
-    double reference_error;     /* [m] estimate of its error */
+    double reference_error;     /* estimate of its error: [m], or without `times` a share of the diagonal */
     const double *times;        /* (time_count) [s] at which steps end, and at which it is compared and
-                                   recorded; NULL: at frames, which may lie within steps, and at the end */
+                                   recorded; NULL: at frames, which may lie within steps, and at the end,
+                                   by geometry/deviation.h */
     size_t time_count;
     const int32_t
         *compared;     /* (cloths) so many nodes of each have their positions in the result; NULL: none */
@@ -74,6 +75,9 @@ typedef struct lab_experiment_ops {
     drape_status (*report)(lab *l);
     bool partial; /* a def may have a budget, after which the cases with the highest ranks are left out */
     bool shows_results; /* a def may name results that the figures show */
+    /* The cases may be others at each call in the same folder, which keeps the lines of all; the scene
+     * compiles without their settings. */
+    bool grows;
 } lab_experiment_ops;
 
 extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */
@@ -93,9 +97,10 @@ struct lab {
     json_t *about;      /* experiment.json; owned, and owns: */
     json_t *cases, *arguments; /* borrowed from it */
     json_t **results;          /* one a case, owned; NULL: not there yet */
+    json_t *others;            /* lines of the folder of cases that this call did not ask for; owned */
     size_t count;              /* of cases */
     lab_trace reference;       /* the motion that cases are compared with; no frames: none */
-    double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
+    double reference_error;    /* estimate of the largest RMS error of its frames, a share of the diagonal */
     double start;              /* [s] wall clock at the start of the run */
     void *own;                 /* of the experiment, in the arena */
     int32_t *compared;         /* in the arena; of requests */
@@ -104,7 +109,7 @@ struct lab {
     size_t summary_size;
     FILE *page; /* the body of the page */
     char *page_text;
-    size_t page_size;
+    size_t page_size, lead_size; /* lead: what comes right after the first sentence */
 };
 
 /* ---- engine_json.c: cases and results as JSON ---- */
@@ -114,6 +119,10 @@ drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_a
 
 /* Whether a case is run by this shard: it is its own, and not the same as another one. */
 bool lab_is_ours(const lab *l, size_t i);
+
+/* The settings with which the scene of the experiment is identified (lab_request): those of its first case,
+ * unless cases may be added before that. */
+const json_t *lab_identified(const lab *l);
 
 /* What a case asks for: its settings, and what all cases of the experiment, or it alone, are compared
  * with. */

@@ -52,11 +52,16 @@ bool lab_is_ours(const lab *l, size_t i)
            !json_object_get(json_array_get(l->cases, i), "same_as");
 }
 
+const json_t *lab_identified(const lab *l)
+{
+    return l->experiment->grows ? NULL : json_object_get(json_array_get(l->cases, 0), "settings");
+}
+
 lab_request lab_request_of(const lab *l, size_t index)
 {
     lab_request request = {.def = l->def,
                            .identity = lab_text(l->about, "scene_hash"),
-                           .identified = json_object_get(json_array_get(l->cases, 0), "settings"),
+                           .identified = lab_identified(l),
                            .settings = json_object_get(json_array_get(l->cases, index), "settings"),
                            .reference = &l->reference,
                            .reference_error = l->reference_error,

@@ -251,7 +251,7 @@ static const char style[] =
 drape_status lab_write_page(lab *l, const char *title)
 {
     char *text = NULL;
-    size_t size = 0;
+    size_t size = 0, lead = 0;
     fflush(l->summary);
     fflush(l->page);
     FILE *out = open_memstream(&text, &size);
@@ -264,17 +264,22 @@ drape_status lab_write_page(lab *l, const char *title)
     fprintf(out, "</title><style>%s</style></head>\n<body>\n<h1>", style);
     put_escaped(out, title);
     fputs("</h1>\n<div class=\"summary\">", out);
-    for (const char *at = l->summary_text; *at;) { /* each line is a paragraph */
+    for (const char *at = l->summary_text; *at;) { /* each line is a paragraph, an indented one a command */
+        const bool command = *at == ' ';
+        if (!command && at > l->summary_text && lead < l->lead_size) {
+            fwrite(l->page_text, 1, l->lead_size, out);
+            lead = l->lead_size;
+        }
         const size_t length = strcspn(at, "\n");
         char *line = strndup(at, length);
-        fputs("<p>", out);
-        put_escaped(out, line ? line : "");
-        fputs("</p>\n", out);
+        fputs(command ? "<pre>" : "<p>", out);
+        put_escaped(out, line ? line + strspn(line, " ") : "");
+        fputs(command ? "</pre>\n" : "</p>\n", out);
         free(line);
         at += length + (at[length] == '\n');
     }
     fputs("</div>\n", out);
-    fwrite(l->page_text, 1, l->page_size, out);
+    fwrite(l->page_text + lead, 1, l->page_size - lead, out);
     json_t *about = json_copy(l->about); /* what was run, to run it again */
     json_object_del(about, "cases");
     char *origin = json_dumps(about, JSON_INDENT(2));

@@ -5,6 +5,7 @@
 #include "base/def.h"
 #include "base/hash.h"
 #include "base/vec3.h"
+#include "geometry/deviation.h"
 #include "io/scene_copy.h"
 #include "model/model.h"
 #include "sim/identity.h"
@@ -21,15 +22,16 @@
 typedef struct run {
     const lab_request *request;
     const drape_model *model;
-    double start;     /* [s] CPU of the thread */
-    double cpu, wall; /* [s] of the steps */
+    double start;           /* [s] CPU of the thread */
+    double cpu, most, wall; /* [s] of the steps; of runs of the same case the least and the most CPU */
     double
         explicit_limit; /* [s] the step that an explicit integrator could take at the start; NaN for others */
     double kinetic;     /* [J] the largest */
-    double squares, far; /* [m2], [m] of the frames that were compared: sum, largest */
-    int64_t compared;    /* frames */
-    bool over_budget;    /* stopped for its CPU time */
-    bool late;           /* stopped at the deadline */
+    drape_deviation *apart; /* from the reference, at its frames; NULL: there is none, or it is at `times` */
+    double far;             /* [m] the largest distance of those at `times` */
+    bool over_budget;       /* stopped for its CPU time */
+    bool late;              /* stopped at the deadline */
+    bool again;             /* a run of the same case is done: this one has no deadline */
     bool cancelled;
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
@@ -161,15 +163,6 @@ drape_status lab_check_identity(drape_context *ctx, const lab_request *request)
     return status;
 }
 
-static void compare(run *r, const double *x, int64_t frame)
-{
-    const lab_trace *reference = r->request->reference;
-    const double d = lab_distance(r->model, x, reference->x + reference->size * (size_t)frame);
-    r->squares += d * d;
-    r->far = fmax(r->far, d);
-    r->compared++;
-}
-
 static drape_status watch(void *user, const drape_event *event)
 {
     run *r = user;
@@ -179,15 +172,16 @@ static drape_status watch(void *user, const drape_event *event)
     if (event->kind == DRAPE_EVENT_FRAME) {
         if (request->times)
             return DRAPE_OK;
-        if (reference && event->frame < reference->frames - 1) /* the last one is the end, not a frame */
-            compare(r, event->positions, event->frame);
+        if (r->apart && event->frame < reference->frames - 1) /* the last one is the end, not a frame */
+            drape_deviation_add(r->apart, event->time, event->positions,
+                                reference->x + reference->size * (size_t)event->frame);
         if (request->record)
             lab_trace_add(request->record, event->positions);
         return DRAPE_OK;
     }
     r->kinetic = fmax(r->kinetic, drape_sim_energy(event->sim).kinetic);
     r->over_budget = drape_clock_thread_seconds() - r->start > request->seconds;
-    r->late = request->deadline > 0 && drape_clock_seconds() > request->deadline;
+    r->late = !r->again && request->deadline > 0 && drape_clock_seconds() > request->deadline;
     r->cancelled =
         (request->given_up && atomic_load(request->given_up)) || (def->cancel && def->cancel(def->user));
     return r->over_budget || r->late || r->cancelled ? DRAPE_RETRY_REJECTED : DRAPE_OK;
@@ -213,7 +207,8 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     for (size_t i = 0; request->times && !r->status && i < request->time_count; i++) {
         r->status = drape_sim_advance(sim, request->times[i]); /* a step ends there */
         if (!r->status && request->reference && (int64_t)i < request->reference->frames)
-            compare(r, drape_sim_positions(sim), (int64_t)i);
+            r->far = fmax(r->far, lab_distance(r->model, drape_sim_positions(sim),
+                                               request->reference->x + request->reference->size * i));
         if (!r->status && request->record)
             lab_trace_add(request->record, drape_sim_positions(sim));
     }
@@ -227,47 +222,63 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
                  drape_sim_time(sim), request->seconds);
     if (request->record && !request->times)
         lab_trace_add(request->record, drape_sim_positions(sim));
+    if (r->apart && !r->status)
+        drape_deviation_add(r->apart, drape_sim_time(sim), drape_sim_positions(sim),
+                            lab_trace_end(request->reference));
     return r->cancelled ? drape_fail(ctx, DRAPE_E_STOPPED, "interrupted") : DRAPE_OK;
 }
 
 /* ---- The result ---- */
+
+/* How far the run is from the reference: the cloth of which that is the largest share of its diagonal, its
+ * largest RMS distance of all frames, and its furthest node. Takes the reference; returns it. */
+static json_t *describe_distance(const run *r, json_t *result)
+{
+    const int32_t c = drape_deviation_worst(r->apart);
+    const drape_deviation_cloth *cloth = &r->apart->cloths[c];
+    const drape_apart *far = &cloth->largest;
+    result = drape_json_with(result, "error_cloth", drape_json_text(r->model->cloths[c].name));
+    result = DRAPE_JSON_COUNTS(result, {"worst_node", far->node});
+    return DRAPE_JSON_REALS(
+        result, {"error", far->rms / cloth->diagonal}, {"error_m", far->rms}, {"error_t_s", far->rms_time},
+        {"worst_m", far->distance}, {"worst_t_s", far->time}, {"worst_x_m", far->place[0][0]},
+        {"worst_y_m", far->place[0][1]}, {"worst_z_m", far->place[0][2]}, {"diagonal_m", cloth->diagonal},
+        {"reference_error", r->request->reference_error});
+}
 
 static json_t *describe(const run *r, drape_sim *sim)
 {
     const lab_request *request = r->request;
     const drape_statistics s = drape_sim_statistics(sim);
     const double *x = drape_sim_positions(sim), numerical = drape_sim_energy(sim).numerical;
-    const bool compares = request->reference && request->reference->frames;
+    const bool compares = request->times && request->reference && request->reference->frames;
     const double accepted = (double)s.steps_accepted, rejected = (double)s.steps_rejected;
     const struct {
         const char *key;
         double value;
         bool counts; /* an integer */
-    } numbers[] = {
-        {"time_s", drape_sim_time(sim)},
-        {"cpu_s", r->cpu},
-        {"wall_s", r->wall},
-        {"error_end_m", compares ? lab_distance(r->model, x, lab_trace_end(request->reference)) : NAN},
-        {"error_l2_m", r->compared ? sqrt(r->squares / (double)r->compared) : NAN},
-        {"error_max_m", r->compared ? r->far : NAN},
-        {"energy_numerical_J", numerical},
-        {"energy_drift", r->kinetic > 0 ? numerical / r->kinetic : NAN},
-        {"strain_min", s.steps_accepted ? s.strain_min : NAN},
-        {"strain_max", s.steps_accepted ? s.strain_max : NAN},
-        {"rejected_share", accepted + rejected > 0 ? rejected / (accepted + rejected) : NAN},
-        {"iterations_per_step", accepted > 0 ? (double)s.newton_iterations / accepted : NAN},
-        {"h_min_s", s.h_min},
-        {"h_max_s", s.h_max},
-        {"explicit_limit_s", r->explicit_limit},
-        {"nodes", (double)drape_model_node_count(r->model), true},
-        {"accepted", (double)s.steps_accepted, true},
-        {"rejected", (double)s.steps_rejected, true},
-        {"unconverged", (double)s.steps_unconverged, true},
-        {"iterations", (double)s.newton_iterations, true},
-        {"residuals", (double)s.residuals, true},
-        {"jacobians", (double)s.jacobians, true},
-        {"factorizations", (double)s.factorizations, true},
-        {"linear_iterations", (double)s.linear_iterations, true}};
+    } numbers[] = {{"time_s", drape_sim_time(sim)},
+                   {"cpu_s", r->cpu},
+                   {"cpu_most_s", r->most},
+                   {"wall_s", r->wall},
+                   {"energy_numerical_J", numerical},
+                   {"energy_drift", r->kinetic > 0 ? numerical / r->kinetic : NAN},
+                   {"strain_min", s.steps_accepted ? s.strain_min : NAN},
+                   {"strain_max", s.steps_accepted ? s.strain_max : NAN},
+                   {"rejected_share", accepted + rejected > 0 ? rejected / (accepted + rejected) : NAN},
+                   {"iterations_per_step", accepted > 0 ? (double)s.newton_iterations / accepted : NAN},
+                   {"h_min_s", s.h_min},
+                   {"h_max_s", s.h_max},
+                   {"explicit_limit_s", r->explicit_limit},
+                   {"nodes", (double)drape_model_node_count(r->model), true},
+                   {"accepted", (double)s.steps_accepted, true},
+                   {"rejected", (double)s.steps_rejected, true},
+                   {"unconverged", (double)s.steps_unconverged, true},
+                   {"iterations", (double)s.newton_iterations, true},
+                   {"residuals", (double)s.residuals, true},
+                   {"jacobians", (double)s.jacobians, true},
+                   {"factorizations", (double)s.factorizations, true},
+                   {"linear_iterations", (double)s.linear_iterations, true}};
     /* A case that took too long is not a failure of the simulation. */
     json_t *result = json_pack("{s:s, s:s}", "status",
                                r->over_budget ? "over_budget" : drape_status_name(r->status), "message",
@@ -282,13 +293,14 @@ static json_t *describe(const run *r, drape_sim *sim)
                             numbers[i].counts ? json_integer((json_int_t)numbers[i].value)
                                               : drape_json_number(numbers[i].value));
     json_object_set_new(result, "reasons", reasons);
-    if (compares)
-        json_object_set_new(result, "reference_error_m", drape_json_number(request->reference_error));
-    if (compares && request->times) {
+    if (r->apart && !r->status)
+        result = describe_distance(r, result);
+    if (compares) {
         /* Errors relative to the size of the scene, of a run that reached its last time. */
         const double size = r->model->length, *end = lab_trace_end(request->reference);
         const double error_end = r->status ? NAN : lab_distance(r->model, x, end) / size,
                      digits = r->status ? NAN : lab_correct_digits(r->model, x, end);
+        json_object_set_new(result, "reference_error_m", drape_json_number(request->reference_error));
         json_object_set_new(result, "size_m", json_real(size));
         json_object_set_new(result, "error_end", drape_json_number(error_end));
         json_object_set_new(result, "error_max", drape_json_number(r->status ? NAN : r->far / size));
@@ -307,8 +319,11 @@ static json_t *describe(const run *r, drape_sim *sim)
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result)
 {
     drape_model *model = NULL;
-    double least = INFINITY;
+    drape_arena arena = drape_arena_of(ctx);
+    drape_deviation apart;
+    double least = INFINITY, most = 0;
     bool repeat = true;
+    const bool compares = !request->times && request->reference && request->reference->frames;
     *result = NULL;
     drape_status status = lab_load(ctx, request, &model);
     if (request->record)
@@ -319,12 +334,17 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
                                   request->times ? (int64_t)request->time_count : (int64_t)frames,
                                   request->record);
     }
+    if (!status && compares)
+        status = drape_deviation_create(&arena, model, model, &apart);
     for (int i = 1; !status && repeat; i++) {
         drape_sim *sim = NULL;
-        run r = {.request = request, .model = model};
+        run r = {.request = request, .model = model, .apart = compares ? &apart : NULL, .again = i > 1};
+        if (compares)
+            drape_deviation_restart(&apart);
         status = drape_sim_create(ctx, model, NULL, &sim);
         if (!status)
             status = run_once(ctx, sim, &r);
+        r.most = most = fmax(most, r.cpu);
         r.cpu = least = fmin(least, r.cpu);
         repeat = i < request->repeats && !r.status && r.cpu < SHORT;
         repeat = repeat && !r.late;
@@ -332,6 +352,7 @@ drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **re
             status = drape_fail(ctx, DRAPE_E_MEMORY, "no memory for a result");
         drape_sim_destroy(&sim);
     }
+    drape_arena_free(&arena);
     drape_model_destroy(&model);
     if (request->record && !lab_is_good(*result)) {
         drape_arena_release(request->arena, request->record->x);

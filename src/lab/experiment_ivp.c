@@ -140,7 +140,9 @@ static double error_of(const json_t *result)
 
 static double resolved_error(const json_t *result)
 {
-    return lab_resolved_error(result, "error_max", RESOLVED);
+    const double error = error_of(result);
+    return error > RESOLVED * lab_number(result, "reference_error_m") / lab_number(result, "size_m") ? error
+                                                                                                     : NAN;
 }
 
 /* The least cost at which a series reaches an error: interpolated in logarithms between neighbours of which
@@ -172,12 +174,13 @@ static double cost_at(const lab_series *s, double error, const json_t **at)
 static void put_cheapest(const lab_table *t, const scene *s, double error)
 {
     const json_t *best_at = NULL, *other_at = NULL;
-    const lab_series *best = NULL, *next = NULL, *base = lab_find_series(s->series, s->count, BASE_METHOD);
+    const lab_series *best = NULL, *next = NULL, *base = NULL;
     double least = NAN, second = NAN;
     char knob[64], other[1200] = "", usual[64];
     for (size_t i = 0; i < s->count; i++) {
         const json_t *at = NULL;
         const double cost = cost_at(&s->series[i], error, &at);
+        base = strcmp(s->series[i].name, BASE_METHOD) == 0 ? &s->series[i] : base;
         if (isnan(cost) || cost >= least)
             continue;
         least = cost;

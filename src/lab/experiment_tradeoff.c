@@ -1,517 +1,513 @@
 /*
- * tradeoff: work against accuracy. Every integrator over its dt or rtol, under the scene's controller and
- * under those that bound an error; every linear solver at one dt. Errors are distances from a reference
- * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
+ * tradeoff: work against accuracy. Integrators over their dt or rtol, each case beside a reference: the measure
+ * is that of geometry/deviation.h, the largest RMS distance of all frames as a share of the diagonal. A case
+ * counts as within an accuracy if its error plus that of the reference is. A later call in the same folder may
+ * ask for other integrators and values, with the same reference.
  */
 #include "base/clock.h"
+#include "base/param.h"
+#include "geometry/deviation.h"
 #include "lab/engine_output.h"
 #include "lab/series.h"
-#include "model/model.h"
-#include "solvers/linear.h"
 
 #include <math.h>
 #include <string.h>
 
-#define RESOLVED    100.0 /* times the reference's error: smaller errors cannot be distinguished from it */
-#define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
-#define BASE_DT     (1.0 / 60)
-#define FEWEST      3 /* cases of a series that is compared with others */
-#define LINEAR_RANK 6
+#define RESOLVED 3.0 /* times the reference's error: smaller errors are not known to a third of themselves */
 
-/* ---- The cases ---- */
+/* ---- The cases ----
+ *
+ * Without names, the methods by which an accuracy is reached (docs/accuracy.md): newton_k with contact, bdf2
+ * without, rosenbrock for small errors. Cheap cases, which answer at the loose end, have low ranks and are run
+ * first. rosenbrock costs more at 1e-2 than at 1e-3 (bench/results/accuracy.md). */
+static const char *const usual[] = {"newton_k", "bdf2", "rosenbrock"};
+static const lab_level steps[] = {{1.0 / 30, 0},  {1.0 / 60, 0},  {1.0 / 120, 1}, {1.0 / 240, 2},
+                                  {1.0 / 480, 3}, {1.0 / 960, 4}, {1.0 / 1920, 5}}; /* [s] */
+static const lab_level rtols[] = {{1e-2, 3}, {1e-3, 0}, {1e-4, 1}, {1e-5, 2}, {1e-6, 4}};
 
-/* If there is a budget, cases of low rank come first: a few points of every integrator, over all of its
- * range, then the points between, then controllers and linear solvers. Among cases of equal rank explicit
- * integrators come last: a stiff sheet makes each of their cases long. */
-static const lab_level steps[] = {{1.0 / 30, 3},  {1.0 / 60, 0},  {1.0 / 120, 3}, {1.0 / 240, 1},
-                                  {1.0 / 480, 4}, {1.0 / 960, 2}, {1.0 / 1920, 5}}; /* [s] */
-static const lab_level rtols[] = {{3e-2, 4}, {1e-2, 2}, {3e-3, 4}, {1e-3, 0},
-                                  {3e-4, 4}, {1e-4, 1}, {1e-5, 3}, {1e-6, 5}};
-static const lab_level controlled[] = {{1e-2, 6}, {1e-3, 5}, {1e-4, 7}};
-static const lab_grid grid = {.rtols = LAB_LEVELS(rtols),
-                              .steps = LAB_LEVELS(steps),
-                              .controlled = LAB_LEVELS(controlled),
-                              .first_step = 1.0 / 480};
+/* Reads the values that the command line gives, "1/60,1/240", in descending order. */
+static drape_status read_levels(lab *l, const drape_lab_setting *setting, lab_levels *levels)
+{
+    lab_level *at = drape_arena_take(&l->arena, strlen(setting->value) + 1, sizeof *at);
+    const char *text = setting->value;
+    double value;
+    if (!at)
+        return DRAPE_E_MEMORY;
+    for (size_t count = 0; text && (text = drape_number_read(text, &value)) && value > 0 && value <= 1;) {
+        size_t i = count++;
+        at[i].rank = (int)i;
+        for (; i > 0 && at[i - 1].value < value; i--)
+            at[i].value = at[i - 1].value;
+        at[i].value = value;
+        *levels = (lab_levels){at, count};
+        if (*text == 0)
+            return DRAPE_OK;
+        text = *text == ',' ? text + 1 : NULL;
+    }
+    return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                      "%s = \"%.60s\": must be numbers above 0, at most 1, separated by commas, such as "
+                      "1/60,1/240 or 1e-3,1e-4",
+                      setting->pointer, setting->value);
+}
 
+/* Settings of dt and rtol are the values that are compared; the others are those of all cases. */
 static drape_status plan(lab *l)
 {
-    for (int i = 0; drape_integrators[i]; i++)
-        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, !drape_integrators[i]->steady_state))
-            DRAPE_TRY(lab_add_integrator(l, &grid, drape_integrators[i]));
-    /* They solve the same equations: only the cost differs. */
-    for (int i = 0; drape_linears[i] && l->def->integrator_count == 0; i++) {
-        char series[96];
-        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
-        const lab_point point = {
-            .series = series,
-            .integrator = BASE_METHOD,
-            .pointer = "/integrator/dt",
-            .level = {BASE_DT, LINEAR_RANK},
-            .more = json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name)};
-        DRAPE_TRY(lab_add_point(l, &point));
+    lab_grid grid = {.rtols = LAB_LEVELS(rtols), .steps = LAB_LEVELS(steps)};
+    drape_lab_def *def = drape_arena_take(&l->arena, 1, sizeof *def);
+    drape_lab_setting *kept = drape_arena_take(&l->arena, l->def->setting_count, sizeof *kept);
+    if (!def || !kept)
+        return DRAPE_E_MEMORY;
+    *def = *l->def;
+    def->settings = kept;
+    def->setting_count = 0;
+    for (size_t i = 0; i < l->def->setting_count; i++) {
+        const drape_lab_setting *one = &l->def->settings[i];
+        const bool is_dt = strcmp(one->pointer, "/integrator/dt") == 0;
+        if (is_dt || strcmp(one->pointer, "/integrator/rtol") == 0)
+            DRAPE_TRY(read_levels(l, one, is_dt ? &grid.steps : &grid.rtols));
+        else
+            kept[def->setting_count++] = *one;
     }
+    if (def->integrator_count == 0) {
+        def->integrators = usual;
+        def->integrator_count = sizeof usual / sizeof *usual;
+    }
+    l->def = def;
+    for (int i = 0; drape_integrators[i]; i++)
+        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, false))
+            DRAPE_TRY(lab_add_integrator(l, &grid, drape_integrators[i]));
     return DRAPE_OK;
 }
 
-/* ---- The reference solution ----
+/* ---- The reference ----
  *
- * The motion of the most accurate run that the time allows, with its distance from the next less accurate one
- * as the estimate of its error. There are two sequences of refinements: ida over rtol at order 5, and trbdf2
- * over dt; the one with the smaller distance between its last two levels is taken. */
+ * The motion of the most accurate run that the time allows, by two families of methods, each over rtol until two
+ * runs agree. Its error is estimated by the distance of its last two runs; or, if the families are further
+ * apart than their estimates together, by what that leaves to it. Every run is saved; once there are cases, the
+ * reference is what is there. */
 
 #define MAX_LEVELS  6
-#define BUDGET      20.0 /* case_seconds that each sequence may take */
-#define SHARE       0.5  /* of the experiment's budget, if it has one, that the sequences may take together */
-#define BEST        1e-8 /* of the scene's size: no further level is needed */
-#define GOOD_ENOUGH 1e-5 /* of the scene's size: no second sequence is tried */
+#define SHARE       0.25 /* of the experiment's budget, if it has one, that each may take */
+#define GOOD_ENOUGH 1e-6 /* of the diagonal: no further level is needed */
 #define GROWTH      2.5  /* expected cost of a level over that of the one before */
-#define FORMAT      "little endian doubles: frames x nodes x 3, the last one the end"
+#define FIRST       1e-3 /* rtol of the first level: larger ones are not cheaper, see above */
 
-/* A sequence of refinements. */
-typedef struct sequence {
-    const char *method, *knob; /* knob: pointer of the value that changes */
-    double first, ratio;       /* its values */
-    const char *also;          /* pointer of another value that is set; NULL: none */
-    double also_value;
-} sequence;
+static const char *const families[2] = {"rosenbrock", "radau"};
 
-static const sequence sequences[] = {
-    {"ida", "/integrator/rtol", 1e-5, 0.1, "/integrator/max_order", 5},
-    {"trbdf2", "/integrator/dt", 1.0 / 960, 0.5, NULL, 0},
-};
-#define SEQUENCES ((int)(sizeof sequences / sizeof *sequences))
-
-/* What ended a sequence before its last level. */
-typedef enum limit { NOTHING, BUDGET_SECONDS, CASE_SECONDS, FAILURE } limit;
-
-/* The last refinement level of a sequence. Every level is saved in the folder; interrupted runs resume. */
+/* The last level of a family. */
 typedef struct level {
     lab_trace trace;
-    double error; /* distance of its end from that of the level before; INFINITY: first level */
-    double knob;
-    int count;          /* levels so far; 0: none */
-    double took, spent; /* CPU [s] of this level, of all */
-    limit ended_by;
-    char failure[200]; /* the message of a run that failed */
+    double error; /* distance from the level before, a share of the diagonal; INFINITY: first level */
+    double rtol;
+    int count;       /* levels so far; 0: none */
+    double took;     /* [s] of the wall clock, of this level; 0: of an earlier call */
+    char ended[240]; /* why there is no further one; "": there may be */
 } level;
 
-static json_t *settings_of(const sequence *s, double knob)
+static json_t *settings_of(const char *method, double rtol)
 {
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", s->method, s->knob, knob);
-    if (s->also)
-        json_object_set_new(settings, s->also, json_real(s->also_value));
-    return settings;
+    return json_pack("{s:s, s:f}", "/integrator/method", method, "/integrator/rtol", rtol);
 }
 
-/* Whether the scene compiles for every sequence, before anything is written. */
+/* Whether the scene compiles for every family, before anything is written, and runs by the method that it is
+ * given. */
 static drape_status check_reference(lab *l)
 {
     drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < SEQUENCES; i++) {
-        json_t *settings = settings_of(&sequences[i], sequences[i].first);
-        status = lab_load(l->ctx, &(lab_request){.def = l->def, .settings = settings}, NULL);
+    for (int i = 0; !status && i < 2; i++) {
+        json_t *settings = settings_of(families[i], FIRST);
+        drape_model *model;
+        status = lab_load(l->ctx, &(lab_request){.def = l->def, .settings = settings}, &model);
+        if (!status && model->accuracy.value > 0)
+            status = drape_fail(
+                l->ctx, DRAPE_E_ARGUMENT,
+                "%.400s: /accuracy: an accuracy chooses the method; leave it out to compare methods",
+                l->def->scene);
+        drape_model_destroy(&model);
         json_decref(settings);
     }
     return status;
 }
 
-/* ---- Files ---- */
-
-/* The name of a file of a sequence; s NULL: of the reference that was chosen. Each shard has reference files
- * of its own. */
-static void name_file(const lab *l, const sequence *s, const char *ending, char name[64])
+/* The name of a file of a family. Each shard has files of its own. */
+static void name_file(const lab *l, const char *method, const char *ending, char name[64])
 {
     char shard[32] = "";
     if (l->def->shards > 1)
         snprintf(shard, sizeof shard, "-%d-of-%d", l->def->shard, l->def->shards);
-    snprintf(name, 64, "reference%s%s%s.%s", s ? "-" : "", s ? s->method : "", shard, ending);
+    snprintf(name, 64, "reference-%s%s.%s", method, shard, ending);
 }
 
-/* Saves a level of a sequence; chosen: as the reference. */
-static drape_status save(lab *l, const sequence *s, bool chosen, const level *last)
+static drape_status save(lab *l, const char *method, const level *last)
 {
     char name[64];
     const lab_trace *trace = &last->trace;
-    name_file(l, chosen ? NULL : s, "f64", name);
-    drape_status status = lab_write_text(l, name, (const char *)trace->x,
-                                         trace->size * (size_t)trace->frames * sizeof *trace->x);
-    json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", s->method,
-                              "knob", s->knob, "value", last->knob, "error_m", drape_json_number(last->error),
-                              "frames", (json_int_t)trace->frames, "size", (json_int_t)trace->size, "format",
-                              FORMAT, "levels", last->count, "took_s", last->took, "spent_s", last->spent);
-    name_file(l, chosen ? NULL : s, "json", name);
-    if (!status)
-        return lab_write_json(l, name, about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    json_decref(about);
-    return status;
+    name_file(l, method, "f64", name);
+    DRAPE_TRY(lab_write_text(l, name, (const char *)trace->x,
+                             trace->size * (size_t)trace->frames * sizeof *trace->x));
+    name_file(l, method, "json", name);
+    return lab_write_json(l, name,
+                          json_pack("{s:f, s:o, s:i, s:s}", "rtol", last->rtol, "error",
+                                    drape_json_number(last->error), "levels", last->count, "format",
+                                    "little endian doubles: frames x nodes x 3, the last one the end"),
+                          JSON_INDENT(1) | JSON_REAL_PRECISION(17));
 }
 
-/* Reads the saved level of an earlier run, if both files exist and belong together and to the model. s: as in
- * name_file. */
-static bool read_saved(lab *l, const drape_model *model, const sequence *s, level *last)
+/* Reads the saved level of an earlier call, if both files exist and belong to the model. */
+static void read_saved(lab *l, const drape_model *model, const char *method, level *last)
 {
     char name[64], *data = NULL;
     size_t bytes = 0;
     json_t *about;
-    name_file(l, s, "json", name);
+    name_file(l, method, "json", name);
     bool read = !lab_read_json(&l->arena, l->folder, name, &about);
-    name_file(l, s, "f64", name);
+    name_file(l, method, "f64", name);
     read = read && !lab_read_text(&l->arena, l->folder, name, &data, &bytes);
     const size_t size = 3 * (size_t)drape_model_node_count(model), frame = size * sizeof(double);
     const int64_t frames = (int64_t)(bytes / frame);
-    const json_int_t levels = json_integer_value(json_object_get(about, "levels"));
-    const double error = lab_number(about, "error_m");
-    const bool fits = read && frames > 0 && bytes % frame == 0 && levels > 0 && levels <= MAX_LEVELS &&
-                      json_integer_value(json_object_get(about, "frames")) == frames &&
-                      lab_number(about, "value") > 0 && lab_number(about, "took_s") >= 0 &&
-                      lab_number(about, "spent_s") >= 0;
-    if (fits) {
+    const double error = lab_number(about, "error"), rtol = lab_number(about, "rtol"),
+                 levels = lab_number(about, "levels");
+    if (read && frames > 0 && bytes % frame == 0 && rtol > 0 && levels > 0 && levels <= MAX_LEVELS)
         *last = (level){.trace = {size, frames, frames, (double *)(void *)data},
-                        .error = isnan(error) ? INFINITY : error,
-                        .knob = lab_number(about, "value"),
-                        .count = (int)levels,
-                        .took = lab_number(about, "took_s"),
-                        .spent = lab_number(about, "spent_s")};
-    }
+                        .error = error >= 0 ? error : INFINITY,
+                        .rtol = rtol,
+                        .count = (int)levels};
     json_decref(about);
-    return fits;
 }
 
-static bool is_sequence(const void *user, const char *name)
+/* How far two levels are apart, a share of the diagonal. */
+static double distance(drape_deviation *apart, const lab_trace *a, const lab_trace *b)
 {
-    static const char *const endings[] = {"json", "f64"};
-    for (int i = 0; i < 2 * SEQUENCES; i++) {
-        char known[64];
-        name_file(user, &sequences[i / 2], endings[i % 2], known);
-        if (strcmp(name, known) == 0)
-            return true;
-    }
-    return false;
+    drape_deviation_restart(apart);
+    for (int64_t k = 0; k < a->frames && k < b->frames; k++)
+        drape_deviation_add(apart, (double)k, a->x + a->size * (size_t)k, b->x + b->size * (size_t)k);
+    const drape_deviation_cloth *worst = &apart->cloths[drape_deviation_worst(apart)];
+    return worst->largest.rms / worst->diagonal;
 }
 
-/* ---- Runs ---- */
-
-/* Runs and saves the next level. If its run does not complete, *last stays the level before it, and keeps
- * what ended the sequence. */
-static drape_status refine(lab *l, const drape_model *model, const sequence *s, double deadline, level *last)
+/* Runs and saves the next level. If its run does not complete, *last stays the level before it. */
+static drape_status refine(lab *l, drape_deviation *apart, const char *method, double deadline, level *last)
 {
-    const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
-    lab_trace trace;
-    json_t *settings = settings_of(s, knob), *result = NULL;
+    const double rtol = last->count ? last->rtol / 10 : FIRST, start = drape_clock_seconds();
+    lab_trace trace = {0};
+    json_t *settings = settings_of(method, rtol), *result = NULL;
     const lab_request request = {.def = l->def,
                                  .settings = settings,
                                  .record = &trace,
                                  .arena = &l->arena,
-                                 .seconds = BUDGET * l->def->case_seconds - last->spent,
+                                 .seconds = INFINITY,
                                  .deadline = deadline,
                                  .repeats = 1};
-    drape_status status = lab_run(l->ctx, &request, &result);
-    if (!trace.frames) { /* a run that the deadline stopped has no result */
-        const bool over = strcmp(lab_text(result, "status"), "over_budget") == 0;
-        last->ended_by = !result ? BUDGET_SECONDS : over ? CASE_SECONDS : FAILURE;
-        snprintf(last->failure, sizeof last->failure, "%s", lab_text(result, "message"));
-    }
+    const bool late = deadline > 0 && !(start + GROWTH * last->took < deadline);
+    drape_status status = late ? DRAPE_OK : lab_run(l->ctx, &request, &result);
+    if (result)
+        snprintf(last->ended, sizeof last->ended, "%s", lab_text(result, "message"));
+    else
+        snprintf(last->ended, sizeof last->ended, "its share of budget_seconds = %g was used up",
+                 l->def->budget_seconds);
     json_decref(settings);
     json_decref(result);
-    last->took = drape_clock_thread_seconds() - start;
-    last->spent += last->took;
-    if (!trace.frames)
+    if (status || !trace.frames)
         return status;
-    last->error =
-        last->count ? lab_distance(model, lab_trace_end(&trace), lab_trace_end(&last->trace)) : INFINITY;
+    last->took = drape_clock_seconds() - start;
+    last->error = last->count ? distance(apart, &trace, &last->trace) : INFINITY;
     drape_arena_release(&l->arena, last->trace.x);
     last->trace = trace;
-    last->knob = knob;
+    last->rtol = rtol;
     last->count++;
-    return save(l, s, false, last);
+    return save(l, method, last);
 }
 
-/* Sets the message that there is no reference: what ended each sequence, and what helps. */
-static drape_status fail_without(lab *l, const level last[SEQUENCES])
+/* Takes the level with the smaller error as l->reference. DRAPE_E_SOLVER: no two runs completed. */
+static drape_status choose(lab *l, drape_deviation *apart, const level last[2])
 {
-    bool by[FAILURE + 1] = {false}, kept = false;
-    char why[SEQUENCES * 320] = "", help[160] = "";
-    size_t end = 0;
-    for (int i = 0; i < SEQUENCES; i++) {
-        char reason[240];
-        by[last[i].ended_by] = true;
-        kept |= last[i].count > 0;
-        if (last[i].ended_by == BUDGET_SECONDS)
-            snprintf(reason, sizeof reason, "its share of budget_seconds = %g was used up",
-                     l->def->budget_seconds);
-        else if (last[i].ended_by == CASE_SECONDS)
-            snprintf(reason, sizeof reason, "its CPU time is limited to %g times case_seconds = %g", BUDGET,
-                     l->def->case_seconds);
-        else
-            snprintf(reason, sizeof reason, "%s", last[i].failure);
-        end += (size_t)snprintf(why + end, sizeof why - end, "%s%s completed %d (%s)", i ? ", " : "",
-                                sequences[i].method, last[i].count, reason);
+    const bool both = last[0].count && last[1].count;
+    const double gap = both ? distance(apart, &last[0].trace, &last[1].trace) : 0;
+    l->reference_error = INFINITY;
+    for (int i = 0; i < 2; i++) {
+        const double own = last[i].error, other = last[!i].error;
+        const double error =
+            isfinite(own) || !both ? fmax(own, gap - other) : gap + (isfinite(other) ? other : 0);
+        if (error < l->reference_error) {
+            l->reference_error = error;
+            l->reference = last[i].trace;
+        }
     }
-    l->resumable = kept && by[BUDGET_SECONDS];
-    if (by[BUDGET_SECONDS] || by[CASE_SECONDS])
-        snprintf(
-            help, sizeof help,
-            ". What helps: a larger %s%s%s, a shorter duration, damping if the sheet is stiff and has none",
-            by[BUDGET_SECONDS] ? "budget_seconds" : "", by[BUDGET_SECONDS] && by[CASE_SECONDS] ? " and " : "",
-            by[CASE_SECONDS] ? "case_seconds" : "");
+    l->resumable = last[0].count + last[1].count > 0;
+    if (isfinite(l->reference_error))
+        return DRAPE_OK;
     return drape_fail(
-        l->ctx, DRAPE_E_SOLVER, "no reference, which takes two levels of refinement: %s%s%s", why, help,
-        l->resumable ? ". The levels are kept, and a larger budget_seconds continues with them" : "");
+        l->ctx, DRAPE_E_SOLVER,
+        "no reference, which takes two runs that complete: %s completed %d (%s), %s completed %d "
+        "(%s). What helps: a larger budget_seconds, a shorter duration, damping if the sheet is stiff and "
+        "has none%s",
+        families[0], last[0].count, last[0].ended, families[1], last[1].count, last[1].ended,
+        l->resumable ? ". The runs are kept, and the same call continues with them" : "");
 }
 
-/* Refines the sequences and takes the better one. */
-static drape_status choose(lab *l, const drape_model *model, level *best)
-{
-    const sequence *chosen = NULL;
-    level last[SEQUENCES];
-    drape_status status = DRAPE_OK;
-    *best = (level){.error = INFINITY};
-    for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
-        level *now = &last[i];
-        /* [s] of the wall clock by which it has to be done; 0: the experiment has no budget. */
-        const double budget = l->def->budget_seconds;
-        const double deadline = budget > 0 ? l->start + SHARE * (i + 1) / SEQUENCES * budget : 0;
-        *now = (level){.error = INFINITY};
-        read_saved(l, model, &sequences[i], now);
-        while (!status && !now->ended_by && now->count < MAX_LEVELS && now->error > BEST * model->length) {
-            const double next = GROWTH * now->took; /* expected */
-            if (!(next < BUDGET * l->def->case_seconds - now->spent))
-                now->ended_by = CASE_SECONDS;
-            else if (deadline > 0 && !(drape_clock_seconds() + next < deadline))
-                now->ended_by = BUDGET_SECONDS;
-            else
-                status = refine(l, model, &sequences[i], deadline, now);
-        }
-        if (!status && now->error < best->error) {
-            *best = *now;
-            chosen = &sequences[i];
-        }
-    }
-    if (status)
-        return status;
-    status = chosen ? save(l, chosen, true, best) : fail_without(l, last);
-    if (l->resumable || (status && status != DRAPE_E_SOLVER))
-        return status;
-    drape_status removed = drape_folder_remove(l->out, is_sequence, l);
-    return status ? status : removed;
-}
-
-/* Makes l->reference, or reads it if the folder has it (reference.json, reference.f64). DRAPE_E_SOLVER if
- * neither sequence has two levels that complete. */
+/* Makes the reference, or reads it if there are cases. */
 static drape_status make_reference(lab *l)
 {
+    drape_deviation apart;
     drape_model *model = NULL;
-    level best;
+    level last[2] = {{.error = INFINITY}, {.error = INFINITY}};
+    const double budget = l->def->budget_seconds;
+    bool there = json_array_size(l->others) > 0;
+    for (size_t i = 0; i < l->count; i++)
+        there |= l->results[i] != NULL;
     drape_status status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
-    if (!status && !read_saved(l, model, NULL, &best)) {
-        if (l->def->progress)
-            l->def->progress(l->def->user, 0, 0, NAN);
-        status = choose(l, model, &best);
+    if (!status)
+        status = drape_deviation_create(&l->arena, model, model, &apart);
+    if (!status && !there && l->def->progress)
+        l->def->progress(l->def->user, 0, 0, NAN);
+    for (int i = 0; !status && i < 2; i++) {
+        read_saved(l, model, families[i], &last[i]);
+        /* [s] of the wall clock by which this family has to be done */
+        const double deadline = budget > 0 ? l->start + SHARE * (i + 1) * budget : 0;
+        while (!status && !there && !*last[i].ended && last[i].count < MAX_LEVELS &&
+               last[i].error > GOOD_ENOUGH)
+            status = refine(l, &apart, families[i], deadline, &last[i]);
     }
+    if (!status)
+        status = choose(l, &apart, last);
     drape_model_destroy(&model);
-    if (!status) {
-        l->reference = best.trace;
-        l->reference_error = best.error;
-    }
     return status;
 }
 
 /* ---- Reading the results ---- */
 
-/* All series but those of linear solvers. */
-typedef struct all {
-    lab_series *series;
-    size_t count;
-} all;
+/* The accuracies that people ask for, shares of the diagonal. */
+static const double accuracies[] = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5};
+#define ACCURACIES ((int)(sizeof accuracies / sizeof *accuracies))
+#define OPENING    2 /* the one that opens the report, or the next larger one that is reached */
 
-static double resolved_error(const json_t *result)
+static bool is_within(const json_t *result, double accuracy)
 {
-    return lab_resolved_error(result, "error_end_m", RESOLVED);
+    return lab_is_good(result) &&
+           lab_number(result, "error") + lab_number(result, "reference_error") <= accuracy;
 }
 
 static bool is_resolved(const json_t *result)
 {
-    return !isnan(resolved_error(result));
+    return lab_is_good(result) &&
+           lab_number(result, "error") > RESOLVED * lab_number(result, "reference_error");
 }
 
-/* The cheapest case with at most that error, of one series (`only`) or of all (NULL) that have enough cases
- * to be compared. NULL: no case is so close. */
-static const json_t *cheapest(all a, double error, const lab_series *only)
+/* The cheapest case of some series that is as accurate. NULL: none is. */
+static const json_t *cheapest(const lab_series *list, size_t count, double accuracy)
 {
     const json_t *best = NULL;
-    for (const lab_series *s = a.series; s < a.series + a.count; s++) {
-        if (s->count < FEWEST || (only && s != only))
-            continue;
+    for (const lab_series *s = list; s < list + count; s++)
         for (size_t i = 0; i < s->count; i++)
-            if (resolved_error(s->results[i]) <= error &&
+            if (is_within(s->results[i], accuracy) &&
                 (!best || lab_number(s->results[i], "cpu_s") < lab_number(best, "cpu_s")))
                 best = s->results[i];
-    }
     return best;
 }
 
-static void length_text(double metres, char *text, size_t size)
+/* "2.1 (1.9 to 2.4)": CPU times of a case over those of another one; the range is that of their runs, if they
+ * were repeated. "": there is no such case. */
+#define RATIO_TEXT(of, to) ratio_text(of, to, (char[64]){0})
+static const char *ratio_text(const json_t *of, const json_t *to, char text[64])
 {
-    if (metres >= 1)
-        snprintf(text, size, "%.3g m", metres);
-    else if (metres >= 1e-3)
-        snprintf(text, size, "%.3g mm", 1e3 * metres);
-    else
-        snprintf(text, size, "%.3g um", 1e6 * metres);
+    const double least = lab_number(of, "cpu_s"), most = lab_number(of, "cpu_most_s");
+    const double to_least = lab_number(to, "cpu_s"), to_most = lab_number(to, "cpu_most_s");
+    if (of && most * to_most > least * to_least)
+        snprintf(text, 64, "%.2g (%.2g to %.2g)", least / to_least, least / to_most, most / to_least);
+    else if (of)
+        snprintf(text, 64, "%.2g", least / to_least);
+    return text;
 }
 
-/* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as
- * much". */
-static void report_cheapest(lab *l, all a, const lab_series *usual, const json_t *best, double error)
+/* A word of a command as a shell takes it. */
+static void put_word(FILE *out, const char *before, const char *word)
 {
-    bool comes_close = false; /* even if that error cannot be distinguished from the reference's */
-    const json_t *base = usual ? cheapest(a, error, usual) : NULL;
-    const double cost = lab_number(best, "cpu_s");
-    char length[32], knob[64];
-    length_text(error, length, sizeof length);
-    lab_knob_text(best, knob);
-    fprintf(l->summary, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
-            lab_tag_text(best, "series"), knob, cost);
-    for (size_t i = 0; usual && i < usual->count; i++)
-        comes_close |=
-            lab_is_good(usual->results[i]) && lab_number(usual->results[i], "error_end_m") <= error;
-    if (base && base != best)
-        fprintf(l->summary, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);
-    else if (comes_close || !usual || usual->count < FEWEST)
-        fprintf(l->summary, ".\n");
-    else
-        fprintf(l->summary, "; " BASE_METHOD " does not come so close in this grid.\n");
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/=._-+:,%@";
+    const bool quoted = word[strspn(word, plain)] != 0;
+    fprintf(out, quoted ? "%s'" : "%s", before);
+    for (; *word; word++)
+        fputs(*word == '\'' ? "'\\''" : (char[]){*word, 0}, out);
+    fputs(quoted ? "'" : "", out);
 }
 
-/* How far the step sizes that programs usually take are from the converged motion. */
-static void report_headline(lab *l, const lab_series *usual)
+/* Makes the command that runs a case, "drape run drop.json --integrator be --dt 1/60", in the arena; NULL: no
+ * memory. */
+static char *command_of(lab *l, const json_t *result)
 {
-    const double usual_steps[] = {BASE_DT, BASE_DT / 16};
-    char errors[2][32];
-    for (int k = 0; k < 2; k++) {
-        const json_t *found = NULL;
-        for (size_t i = 0; usual && i < usual->count && !found; i++)
-            if (fabs(lab_tag_number(usual->results[i], "value") / usual_steps[k] - 1) < 1e-9 &&
-                lab_is_good(usual->results[i]))
-                found = usual->results[i];
-        if (!found)
-            return;
-        length_text(lab_number(found, "error_end_m"), errors[k], sizeof errors[k]);
+    const json_t *one = json_array_get(l->cases, (size_t)json_integer_value(json_object_get(result, "case")));
+    const char *pointer;
+    char *text = NULL, *kept;
+    size_t size;
+    json_t *value, *setting;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return NULL;
+    put_word(out, "drape run ", lab_text(l->about, "scene"));
+    put_word(out, " --integrator ", lab_tag_text(result, "integrator"));
+    for (size_t i = 0; (setting = json_array_get(json_object_get(l->about, "settings"), i)); i++) {
+        const char *at = json_string_value(json_array_get(setting, 0)),
+                   *to = json_string_value(json_array_get(setting, 1));
+        put_word(out, " --set ", at ? at : "");
+        put_word(out, "=", to ? to : "");
     }
-    fprintf(l->summary,
-            BASE_METHOD " with steps of 1/60 s ends %s (root mean square over the nodes) from the converged "
-                        "motion, with steps of 1/960 s %s.\n",
-            errors[0], errors[1]);
+    json_object_foreach(json_object_get(one, "settings"), pointer, value)
+    {
+        const double number = json_number_value(value), whole = round(1 / number);
+        const bool is_dt = strcmp(pointer, "/integrator/dt") == 0;
+        if (strcmp(pointer, "/integrator/method") == 0)
+            continue;
+        put_word(out, is_dt ? " --dt " : " --set ", is_dt ? "" : pointer);
+        fputs(is_dt ? "" : "=", out);
+        if (is_dt && 1 / whole == number)
+            fprintf(out, "1/%.17g", whole);
+        else
+            fputs(DRAPE_NUMBER_TEXT(number), out);
+    }
+    kept = fclose(out) ? NULL : drape_arena_text(&l->arena, text);
+    free(text);
+    return kept;
 }
 
-static void report_reference(lab *l)
+/* "For 1 % of the size (24.3 mm) use newton_k, dt 1/120 s: 0.83 s of CPU; bdf2 takes 2.1 (1.9 to 2.4) times as
+ * much", how far it is off and where, and the command. */
+static drape_status report_cheapest(lab *l, const lab_series *list, size_t count, double accuracy)
 {
-    double smallest = INFINITY, reference = NAN;
-    int unresolved = 0, late = 0;
+    const json_t *best = cheapest(list, count, accuracy);
+    const char *command = command_of(l, best), *times = "times as much";
+    char knob[64];
+    if (!command)
+        return DRAPE_E_MEMORY;
+    lab_knob_text(best, knob);
+    fprintf(l->summary, "For %.3g %% of the size (%.3g mm) use %s, %s: %.2g s of CPU", 100 * accuracy,
+            1e3 * accuracy * lab_number(best, "diagonal_m"), lab_tag_text(best, "series"), knob,
+            lab_number(best, "cpu_s"));
+    for (const lab_series *s = list; s < list + count; s++) {
+        const json_t *other = cheapest(s, 1, accuracy);
+        if (!other || other == best)
+            continue;
+        fprintf(l->summary, "; %s takes %s %s", s->name, RATIO_TEXT(other, best), times);
+        times = "times";
+    }
+    if (is_resolved(best))
+        fprintf(
+            l->summary,
+            ". It is off by %.2g %% (%.3g mm, RMS over the nodes of %s at t=%.4g s), node %.0f by %.3g mm at "
+            "t=%.4g s near (%.4g, %.4g, %.4g).\n    %s\n",
+            100 * lab_number(best, "error"), 1e3 * lab_number(best, "error_m"), lab_text(best, "error_cloth"),
+            lab_number(best, "error_t_s"), lab_number(best, "worst_node"), 1e3 * lab_number(best, "worst_m"),
+            lab_number(best, "worst_t_s"), lab_number(best, "worst_x_m"), lab_number(best, "worst_y_m"),
+            lab_number(best, "worst_z_m"), command);
+    else
+        fprintf(l->summary, ". It is off by %.2g %% at most, the error of the reference included.\n    %s\n",
+                100 * (lab_number(best, "error") + lab_number(best, "reference_error")), command);
+    return DRAPE_OK;
+}
+
+/* The cases that did not complete, with their reasons; how well the reference is known. */
+static void report_rest(lab *l)
+{
+    const char *comma = "Did not complete: ";
+    double reference = NAN;
+    int unresolved = 0;
+    char knob[64];
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
-        double error = resolved_error(r);
-        if (!r)
-            continue;
-        reference = lab_number(r, "reference_error_m");
-        smallest = error < smallest ? error : smallest;
-        unresolved += lab_is_good(r) && isnan(error);
-        late += strcmp(lab_text(r, "status"), "over_budget") == 0;
+        if (r && !lab_is_good(r)) {
+            lab_knob_text(r, knob);
+            fprintf(l->summary, "%s%s, %s (%s: %s)", comma, lab_tag_text(r, "series"), knob,
+                    lab_text(r, "status"), lab_text(r, "message"));
+            comma = "; ";
+        } else if (r) {
+            reference = lab_number(r, "reference_error");
+            unresolved += !is_resolved(r);
+        }
     }
-    fprintf(l->summary, "The reference's error is estimated as %.2g m; ", reference);
-    if (!isfinite(smallest))
-        fprintf(l->summary,
-                "no error is plotted: a shorter duration, or a larger budget, may give a better one. ");
-    else if (reference > 0)
-        fprintf(l->summary, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
-                smallest / reference);
-    else
-        fprintf(l->summary, "the smallest error plotted is %.2g m. ", smallest);
-    fprintf(l->summary,
-            "%d cases closer than 100 times are listed and not plotted; %d took more than their CPU time "
-            "and were stopped.\n",
-            unresolved, late);
+    fputs(*comma == ';' ? ".\n" : "", l->summary);
+    fprintf(
+        l->summary,
+        "The reference's error is estimated as %.2g of the size, the diagonal of the cloth; %d cases closer "
+        "than three times that are listed and not drawn.\n",
+        reference, unresolved);
 }
 
-/* ---- Figures and the table ---- */
-
-static void write_table(lab *l)
+/* All cases: those that did not complete, or were not run, have no numbers. */
+static void write_cases(lab *l)
 {
-    static const char *const keys[] = {"error_end_m", "error_l2_m",     "energy_drift",     "strain_max",
-                                       "cpu_s",       "accepted",       "rejected",         "residuals",
-                                       "jacobians",   "factorizations", "linear_iterations"};
-    enum { KEYS = sizeof keys / sizeof *keys, OF_GOOD = 3 }; /* the first are those of completed cases */
+    static const char *const keys[] = {"error",      "error_m",   "error_t_s", "worst_m",   "worst_node",
+                                       "worst_t_s",  "worst_x_m", "worst_y_m", "worst_z_m", "cpu_s",
+                                       "cpu_most_s", "accepted",  "rejected",  "residuals"};
+    enum { KEYS = sizeof keys / sizeof *keys };
     const lab_table t = {.l = l};
     char knob[64], cells[32 * KEYS] = "";
     for (size_t k = 0; k < KEYS; k++)
         snprintf(cells + strlen(cells), sizeof cells - strlen(cells), "\t%s", keys[k]);
-    lab_table_begin(&t, "All cases", "integrator\tsetting\tstatus%s", cells);
+    lab_table_begin(&t, "All cases", "integrator\tsetting\tstatus\tcloth%s", cells);
     for (size_t i = 0; i < l->count; i++) {
-        const json_t *r = l->results[i];
-        if (!r)
-            continue;
-        lab_knob_text(r, knob);
+        const json_t *r = l->results[i], *one = r ? r : json_array_get(l->cases, i);
+        lab_knob_text(one, knob);
         *cells = 0;
         for (size_t k = 0; k < KEYS; k++) {
-            const double value = lab_is_good(r) || k >= OF_GOOD ? lab_number(r, keys[k]) : NAN;
-            snprintf(cells + strlen(cells), sizeof cells - strlen(cells), isnan(value) ? "\t" : "\t%.4g",
+            const double value = lab_number(r, keys[k]);
+            snprintf(cells + strlen(cells), sizeof cells - strlen(cells),
+                     !lab_is_good(r)         ? "\t"
+                     : value == floor(value) ? "\t%.0f"
+                                             : "\t%.4g",
                      value);
         }
-        lab_table_row(&t, "%s\t%s\t%s%s", lab_tag_text(r, "series"), knob, lab_text(r, "status"), cells);
+        lab_table_row(&t, "%s\t%s\t%s\t%s%s", lab_tag_text(one, "series"), knob,
+                      r ? lab_text(r, "status") : "not run", lab_text(r, "error_cloth"), cells);
     }
     lab_table_end(&t);
 }
 
 static drape_status report(lab *l)
 {
-#define CPU  .x = "cpu_s", .x_label = "CPU [s]"
-#define ENDS .y = "error_end_m", .y_label = "error at the end, RMS [m]", .shows = is_resolved
+#define ERROR .y = "error", .y_label = "largest RMS error / diagonal"
     static const lab_chart charts[] = {
-        {.name = "error_cpu", CPU, ENDS},
-        {.name = "error_l2_cpu",
-         CPU,
-         .y = "error_l2_m",
-         .y_label = "error over time, RMS [m]",
+        {.name = "error_cpu", .x = "cpu_s", .x_label = "CPU [s]", ERROR, .shows = is_resolved},
+        {.name = "worst_cpu",
+         .x = "cpu_s",
+         .x_label = "CPU [s]",
+         .y = "worst_m",
+         .y_label = "largest error of a node [m]",
          .shows = is_resolved},
-        {.name = "error_residuals", .x = "residuals", .x_label = "residuals", ENDS},
-        {.name = "error_jacobians", .x = "jacobians", .x_label = "Jacobians", ENDS},
     };
-    size_t listed;
-    all a = {.series = lab_list_series(l, NULL, &listed)};
-    if (!a.series)
+    size_t count;
+    const lab_series *list = lab_list_series(l, NULL, &count);
+    const json_t *opening, *next;
+    int k = OPENING;
+    if (!list)
         return DRAPE_E_MEMORY;
-    for (size_t i = 0; i < listed; i++)
-        if (!strstr(a.series[i].name, "linear solver"))
-            a.series[a.count++] = a.series[i];
-    const lab_series *usual = lab_find_series(a.series, a.count, BASE_METHOD);
-    report_headline(l, usual);
-    /* The series of which too few cases were run; those without any are named among what was left out. */
-    bool any = false;
-    for (const lab_series *s = a.series; s < a.series + a.count; s++)
-        if (s->count > 0 && s->count < FEWEST) {
-            if (!any)
-                fprintf(l->summary, "Too few cases for a comparison, which takes %d:", FEWEST);
-            fprintf(l->summary, "%s %s (%zu)", any ? "," : "", s->name, s->count);
-            any = true;
-        }
-    if (any)
-        fprintf(l->summary, ".\n");
-    for (int decade = 0; decade >= -7; decade--) {
-        const json_t *best = cheapest(a, pow(10, decade), NULL);
-        if (best && best != cheapest(a, pow(10, decade + 1), NULL))
-            report_cheapest(l, a, usual, best, pow(10, decade));
+    while (!(opening = cheapest(list, count, accuracies[k])) && k > 0)
+        k--;
+    if (opening)
+        DRAPE_TRY(report_cheapest(l, list, count, accuracies[k]));
+    else
+        fprintf(l->summary,
+                "No case is known to be within %g %% of the size: a shorter duration or a larger "
+                "budget may find one.\n",
+                100 * accuracies[k]);
+    for (const json_t *best = opening; best && ++k <= ACCURACIES; best = next) {
+        next = k < ACCURACIES ? cheapest(list, count, accuracies[k]) : NULL;
+        if (best != next && best != opening)
+            DRAPE_TRY(report_cheapest(l, list, count, accuracies[k - 1]));
     }
-    report_reference(l);
-    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++)
-        DRAPE_TRY(lab_draw_series(l, &charts[i], a.series, a.count));
-    write_table(l);
+    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
+        DRAPE_TRY(lab_draw_series(l, &charts[i], list, count));
+        fflush(l->page);
+        l->lead_size = i == 0 ? l->page_size : l->lead_size;
+    }
+    report_rest(l);
+    write_cases(l);
     return DRAPE_OK;
 }
 
 const lab_experiment_ops lab_experiment_tradeoff = {
-    .entry = {.name = "tradeoff", .summary = "work against accuracy of every integrator over its settings"},
+    .entry = {.name = "tradeoff", .summary = "work against accuracy of integrators over their settings"},
     .compares_costs = true,
     .partial = true,
+    .grows = true,
     .plan = plan,
     .check = check_reference,
     .prepare = make_reference,

@@ -120,21 +120,6 @@ lab_series *lab_list_series(lab *l, const char *scene, size_t *count)
     return results ? list : NULL;
 }
 
-const lab_series *lab_find_series(const lab_series *list, size_t count, const char *name)
-{
-    for (size_t i = 0; i < count; i++)
-        if (strcmp(list[i].name, name) == 0)
-            return &list[i];
-    return NULL;
-}
-
-double lab_resolved_error(const json_t *result, const char *key, double times)
-{
-    const double error = lab_is_good(result) ? lab_number(result, key) : NAN;
-    const double size = lab_number(result, "size_m"); /* that errors are relative to; NaN: none */
-    return error > times * lab_number(result, "reference_error_m") / (isnan(size) ? 1 : size) ? error : NAN;
-}
-
 drape_status lab_draw_series(lab *l, const lab_chart *c, const lab_series *list, size_t count)
 {
     lab_figure f;

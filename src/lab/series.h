@@ -68,13 +68,6 @@ typedef struct lab_series {
 /* The series of a scene, or of all (NULL), in the order of the plan. In the arena; NULL: out of memory. */
 lab_series *lab_list_series(lab *l, const char *scene, size_t *count);
 
-/* The series of that name; NULL: there is none. */
-const lab_series *lab_find_series(const lab_series *list, size_t count, const char *name);
-
-/* The error of a result, one of its members, if it can be distinguished from that of the reference: if it is
- * more than so many times the reference's. Otherwise, and for a run that did not complete, NaN. */
-double lab_resolved_error(const json_t *result, const char *key, double times);
-
 /* A figure of series, a curve each, over logarithmic axes. */
 typedef struct lab_chart {
     const char *name, *title, *caption; /* NULL: no title; the caption is y_label */

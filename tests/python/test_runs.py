@@ -190,7 +190,7 @@ def test_lab():
     orders = columns(drape.converge(scene, integrators=["be"], levels=3))
     equal(orders["value"].tolist(), sorted(orders["value"], reverse=True))
     work = columns(drape.tradeoff(drape.Scene(scene), integrators=["be"], budget=0.1, set={"/duration": 0.02}))
-    assert len(work["case"]) and work["reference_error_m"].dtype.kind == "f"
+    assert len(work["case"]) and work["reference_error"].dtype.kind == "f"
     cases = columns(drape.validate("oscillator"))
     equal(set(cases["verdict"]), {"pass"})
     assert np.all(abs(cases["error"]) < cases["tolerance"])
