@@ -93,9 +93,10 @@ DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 /* Runs "tradeoff", "stability", "converge" or "ivp" and writes cases.jsonl, experiment.json, results.csv,
  * figures (SVG and PDF) and report.html into the folder. A shard, whose folder other shards may share,
  * writes only experiment.json and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the
- * same experiment are kept as they are; a tradeoff that is not a shard may have other cases each time. With def->plan it runs a sample and writes plan.json, and no figures
- * and page. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a
- * setting that no case uses, a folder that holds another experiment), those of loading the scene,
+ * same experiment are kept as they are; a tradeoff that is not a shard may have other cases each time. With
+ * def->plan it runs a sample and writes plan.json, and no figures and page. Errors: DRAPE_E_ARGUMENT (no such
+ * experiment, an invalid def, a setting that no case uses, a folder that holds another experiment, methods
+ * compared on a scene with an accuracy), those of loading the scene,
  * DRAPE_E_FILE, DRAPE_E_SOLVER (the reference could not be computed: the folder is left as it was, but for
  * levels of the reference, with which the same call with a larger budget_seconds continues), DRAPE_E_MEMORY,
  * DRAPE_E_STOPPED (cancelled). */

@@ -93,7 +93,7 @@ def test_unknown_names():
 
 
 def test_fractions():
-    """a fraction is a number wherever one is read, and one that is none is refused in one line"""
+    """a fraction is a number wherever one is read; a text that only resembles one is refused in one line"""
     write_scene()
     assert "10 accepted, 0 rejected; 0.005 to 0.005 s" in good("run", "scene.json", "--dt", "1/200", "--duration", "1/20", "--set", "/integrator/method=be")
     for args, says in ((["run", "--dt", "1/0"], '/integrator/dt: "1/0" is not allowed; dt is a number in (0, 1e6] s'),

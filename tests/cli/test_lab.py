@@ -72,13 +72,13 @@ def test_tradeoff():
         assert f"{case['accepted']} accepted" in printed, (command, printed)
         (_, nodes, _), x = read_npy(f"r{k}/positions.npy")
         # The same bits as of the case, beside the reference that was chosen; sums of 48 squares are rounded.
-        told = []
+        known = []
         for reference in references:
             found = list(distances([x[i:i + 3 * nodes] for i in range(0, len(x), 3 * nodes)], reference))
             far = max(found, key=lambda f: f[2])
-            told.append((max(found)[0], far[2], found.index(max(found)) / 30, found.index(far) / 30, far[1]))
+            known.append((max(found)[0], far[2], found.index(max(found)) / 30, found.index(far) / 30, far[1]))
         keys = ("error_m", "worst_m", "error_t_s", "worst_t_s", "worst_node")
-        assert any(all(abs(case[key] - value) <= 1e-12 for key, value in zip(keys, one)) for one in told), (case, told)
+        assert any(all(abs(case[key] - value) <= 1e-12 for key, value in zip(keys, one)) for one in known), (case, known)
         assert case["error_cloth"] == "sheet" and abs(case["error"] * case["diagonal_m"] - case["error_m"]) < 1e-12, case
         # Without a difference of the families beyond their estimates, the error is the smaller one of these.
         assert case["reference_error"] >= min(read_json(f"t/reference-{family}.json")["error"] for family in ("rosenbrock", "radau")) * (1 - 1e-12), case
@@ -114,6 +114,9 @@ def test_tradeoff_in_steps():
         equal({**new, "case": 0}, {**old, "case": 0}, "a case that was done")
     # In shards, which share a folder, cases do not change; neither does a scene.
     refused(*command, "--dt", "1/30", "--integrators", "be", "--shard", "1/2", says="holds another experiment")
+    for shard in "1/2", "2/2":
+        good(*command[:-1], "parts", "--dt", "1/30,1/60", "--integrators", "be,bdf2", "--shard", shard)
+    assert "4 of 4 cases done; 0 of them" in good("merge", "parts", "--out", "whole") and page_is_alone("whole/report.html")
     write_scene(duration=0.2)
     refused(*command, "--dt", "1/30", "--integrators", "be", says="holds another experiment, or this one of another scene or version")
     for name, values in (("--dt", "1/0"), ("--dt", "1/60,"), ("--dt", "a/b"), ("--dt", "-1/60"), ("--dt", "1/60 1/30")):
