@@ -524,7 +524,7 @@ def without_reference(*limit, named):
 def test_reference_over_budget():
     """a budget that ends before there is a reference is named, and the runs so far stay for a larger one"""
     write_scene()
-    command = without_reference("--budget", "1e-7", named="its share of budget_seconds = 6e-06")
+    command = without_reference("--budget", "1e-7", named="half of budget_seconds = 6e-06")
     # A folder with one run: that of a whole call becomes the first one of rosenbrock.
     good(*command, "--budget", "none")
     about = read_json("t/reference-rosenbrock.json")
@@ -536,7 +536,7 @@ def test_reference_over_budget():
     claim("t", "reference-rosenbrock.json")
     result = drape(*command, "--budget", "1e-7")
     equal(result.returncode, 1, "exit code")
-    assert "rosenbrock completed 1 (its share of budget_seconds" in result.stderr and "The runs are kept" in result.stderr, result.stderr
+    assert "rosenbrock completed 1 (half of budget_seconds" in result.stderr and "The runs are kept" in result.stderr, result.stderr
     assert os.path.exists("t/reference-rosenbrock.json") and os.path.exists("t/experiment.json"), os.listdir("t")
     good(*command, "--budget", "none")
     assert read_json("t/reference-rosenbrock.json")["levels"] >= 2, "the runs went on"
@@ -730,7 +730,7 @@ def test_path():
 def test_no_reference():
     """a tradeoff whose reference does not complete leaves no folder behind"""
     write_scene()
-    command = without_reference("--budget", "1e-7", named="its share of budget_seconds")
+    command = without_reference("--budget", "1e-7", named="half of budget_seconds")
     os.mkdir("t")
     write_text("t/mine", "kept\n")
     equal(drape(*command, "--budget", "1e-7").returncode, 1, "exit code")
