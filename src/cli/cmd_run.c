@@ -612,7 +612,7 @@ static drape_status begin_again(void *user, drape_sim *sim, const drape_accuracy
     cli_signals_cancel(NULL);
     if (cli_interrupted())
         return DRAPE_E_STOPPED;
-    cli_progress_clear(&r->progress);
+    cli_progress_hide(&r->progress);
     if (before->runs > 1 && r->progress.on)
         fprintf(stderr, "run %d: %s\n", (int)before->runs, before->method);
     drape_recorder_destroy(&r->recorder);
