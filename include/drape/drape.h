@@ -138,7 +138,7 @@ typedef struct drape_mesh_def {
                                           second */
     double translate[3];               /* [m]; default 0; applied last */
     int32_t subdivide; /* each triangle in four, so many times, at most 12; nodes keep their numbers, and
-                          nodes between pinned ones are pinned; default 0 */
+                          nodes between those of one pin are pinned; default 0 */
     void *reserved[3]; /* must be NULL */
 } drape_mesh_def;
 

@@ -344,8 +344,9 @@ class Sim:
         work = ctypes.c_double()
         found: Dict[str, float] = {}
         with self._lock:
-            while (name := lib.drape_sim_work(self._open(), len(found), ctypes.addressof(work))) is not None:
-                found[name.decode()] = work.value
+            index = 0
+            while (name := lib.drape_sim_work(self._open(), index, ctypes.addressof(work))) is not None:
+                found[name.decode()], index = work.value, index + 1
             self._raise_pending()
         return found
 

@@ -44,21 +44,32 @@ static double value_of(const judge *j, const char *name)
     return isnan(value) ? drape_chosen_controller_value(&j->chosen, name, NAN) : value;
 }
 
-/* With steps or tolerances of the run times a factor. Tolerances that the scene does not give follow rtol. */
+/* With tolerances of the run, and all that bounds its steps, times a factor: of steps a half, if it is not 1.
+ * Tolerances that the scene does not give follow rtol. */
 static drape_status create(const judge *j, const drape_model *model, double factor, drape_sim **sim)
 {
-    static const char *const names[] = {"dt", "rtol", "atol_x", "atol_v"};
-    drape_setting settings[4];
+    static const char *const names[] = {"rtol",       "atol_x",   "atol_v",   "dt",
+                                        "fixed_step", "max_step", "max_move", "max_stretch"};
+    enum { TOLERANCES = 3, COUNT = sizeof names / sizeof *names };
+    drape_setting of_integrator[COUNT], of_controller[COUNT];
     drape_sim_def def = *j->given;
-    size_t count = 0;
-    for (size_t i = j->controlled; i < (j->controlled ? 4u : 1u); i++)
-        if (!isnan(value_of(j, names[i])))
-            settings[count++] = (drape_setting){.name = names[i], .number = factor * value_of(j, names[i])};
+    def.integrator_settings = of_integrator;
+    def.controller_settings = of_controller;
+    def.integrator_setting_count = def.controller_setting_count = 0;
+    for (size_t i = 0; i < COUNT; i++) {
+        const bool steps = i >= TOLERANCES;
+        const double by_integrator = drape_chosen_integrator_value(&j->chosen, names[i], NAN),
+                     by_controller = drape_chosen_controller_value(&j->chosen, names[i], NAN),
+                     scale = steps && factor < 1 ? FINER : factor;
+        if (!isnan(by_integrator))
+            of_integrator[def.integrator_setting_count++] =
+                (drape_setting){.name = names[i], .number = scale * by_integrator};
+        if (!isnan(by_controller))
+            of_controller[def.controller_setting_count++] =
+                (drape_setting){.name = names[i], .number = scale * by_controller};
+    }
     def.integrator = j->chosen.integrator->entry.name;
     def.controller = j->chosen.controller->entry.name;
-    def.integrator_settings = def.controller_settings = settings;
-    def.integrator_setting_count = count;
-    def.controller_setting_count = j->controlled ? count : 0;
     return drape_sim_create(j->ctx, model, &def, sim);
 }
 

@@ -237,7 +237,10 @@ static json_t *describe_distance(const run *r, json_t *result)
     const int32_t c = drape_deviation_worst(r->apart);
     const drape_deviation_cloth *cloth = &r->apart->cloths[c];
     const drape_apart *far = &cloth->largest;
-    result = drape_json_with(result, "error_cloth", drape_json_text(r->model->cloths[c].name));
+    char name[256];
+    snprintf(name, sizeof name, "%s", r->model->cloths[c].name);
+    drape_make_printable(name);
+    result = drape_json_with(result, "error_cloth", drape_json_text(name));
     result = DRAPE_JSON_COUNTS(result, {"worst_node", far->node});
     return DRAPE_JSON_REALS(
         result, {"error", far->rms / cloth->diagonal}, {"error_m", far->rms}, {"error_t_s", far->rms_time},

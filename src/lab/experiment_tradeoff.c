@@ -254,8 +254,11 @@ static drape_status make_reference(lab *l)
     level last[2] = {{.error = INFINITY}, {.error = INFINITY}};
     const double budget = l->def->budget_seconds, deadline = budget > 0 ? l->start + SHARE * budget : 0;
     bool goes_on = l->def->shards > 1 || json_array_size(l->others) == 0;
-    for (size_t i = 0; i < l->count; i++)
+    size_t done = 0;
+    for (size_t i = 0; i < l->count; i++) {
         goes_on &= !l->results[i] || !lab_is_ours(l, i);
+        done += l->results[i] != NULL;
+    }
     drape_status status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
     if (!status)
         status = drape_deviation_create(&l->arena, model, model, &apart);
@@ -263,7 +266,11 @@ static drape_status make_reference(lab *l)
         l->def->progress(l->def->user, 0, 0, NAN);
     for (int i = 0; !status && i < 2; i++)
         read_saved(l, model, families[i], &last[i]);
-    while (!status && goes_on) { /* a run of each in turn, so that there are two that can be compared soon */
+    const bool none = last[0].count + last[1].count == 0;
+    goes_on = goes_on || none; /* such as of cases that were merged, which have their own */
+    while (!status && goes_on &&
+           !(none &&
+             done == l->count)) { /* a run of each in turn, so that there are two that can be compared soon */
         goes_on = false;
         for (int i = 0; !status && i < 2; i++)
             if (!*last[i].ended && last[i].count < MAX_LEVELS && last[i].error > GOOD_ENOUGH) {
@@ -271,7 +278,7 @@ static drape_status make_reference(lab *l)
                 goes_on = true;
             }
     }
-    if (!status)
+    if (!status && !(none && done == l->count))
         status = choose(l, &apart, last);
     drape_model_destroy(&model);
     return status;
@@ -327,9 +334,15 @@ static void put_word(FILE *out, const char *before, const char *word)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789/=._-+:,%@";
     const bool quoted = word[strspn(word, plain)] != 0;
-    fprintf(out, quoted ? "%s'" : "%s", before);
+    bool controls = false;
+    for (const char *c = word; *c; c++)
+        controls = controls || (unsigned char)*c < ' ' || *c == 127;
+    fprintf(out, controls ? "%s$'" : quoted ? "%s'" : "%s", before);
     for (; *word; word++)
-        fputs(*word == '\'' ? "'\\''" : (char[]){*word, 0}, out);
+        if (controls && ((unsigned char)*word < ' ' || *word == 127 || *word == '\'' || *word == '\\'))
+            fprintf(out, "\\%03o", (unsigned)*word);
+        else
+            fputs(*word == '\'' ? "'\\''" : (char[]){*word, 0}, out);
     fputs(quoted ? "'" : "", out);
 }
 
@@ -345,7 +358,8 @@ static char *command_of(lab *l, const json_t *result)
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return NULL;
-    put_word(out, "drape run ", lab_text(l->about, "scene"));
+    const char *scene = lab_text(l->about, "scene");
+    put_word(out, *scene == '-' ? "drape run ./" : "drape run ", scene);
     put_word(out, " --integrator ", lab_tag_text(result, "integrator"));
     for (size_t i = 0; (setting = json_array_get(json_object_get(l->about, "settings"), i)); i++) {
         const char *at = json_string_value(json_array_get(setting, 0)),
@@ -423,6 +437,8 @@ static void report_rest(lab *l)
         }
     }
     fputs(*comma == ';' ? ".\n" : "", l->summary);
+    if (isnan(reference))
+        return;
     fprintf(
         l->summary,
         "The reference's error is estimated as %.2g of the size, the diagonal of the cloth; %d cases closer "

@@ -9,8 +9,6 @@ static drape_status split(drape_context *ctx, const drape_mesh_source *source, d
 {
     const size_t nodes = (size_t)mesh->node_count, edges = (size_t)mesh->edge_count,
                  triangles = (size_t)mesh->triangle_count, parents = nodes - (size_t)mesh->given->node_count;
-    if (nodes + edges > DRAPE_MAX_NODES)
-        return drape_mesh_fail(ctx, source, 0, "subdivided, it has more than %d nodes", DRAPE_MAX_NODES);
     double *x = drape_arena_resize(&mesh->arena, mesh->x, nodes + edges, 3 * sizeof *x);
     mesh->x = x ? x : mesh->x;
     int32_t *parent = drape_arena_resize(&mesh->arena, mesh->parent, parents + edges, 2 * sizeof *parent),
@@ -40,9 +38,17 @@ static drape_status split(drape_context *ctx, const drape_mesh_source *source, d
 drape_status drape_mesh_subdivide(drape_context *ctx, const drape_mesh_source *source, int times,
                                   drape_mesh *mesh)
 {
+    int64_t nodes = mesh->node_count, edges = mesh->edge_count, triangles = mesh->triangle_count;
     mesh->subdivided = times;
     if (times == 0)
         return DRAPE_OK;
+    for (int i = 0; i < times; i++) { /* before any of them is made */
+        nodes += edges;
+        edges = 2 * edges + 3 * triangles;
+        triangles *= 4;
+        if (nodes > DRAPE_MAX_NODES)
+            return drape_mesh_fail(ctx, source, 0, "subdivided, it has more than %d nodes", DRAPE_MAX_NODES);
+    }
     if (!(mesh->given = drape_arena_take(&mesh->arena, 1, sizeof *mesh->given)))
         return DRAPE_E_MEMORY;
     *mesh->given = (drape_mesh){.node_count = mesh->node_count,

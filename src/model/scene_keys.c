@@ -212,8 +212,8 @@ const drape_scene_object drape_form_transform = {.name = "transform", KEYS(trans
 static const drape_scene_key mesh_keys[] = {
     MESH_KEYS(0),
     {DRAPE_INTEGER("subdivide", "1", 0, 0, 12,
-                   "each triangle in four, so many times; nodes keep their numbers, and nodes between pinned "
-                   "ones are pinned"),
+                   "each triangle in four, so many times; nodes keep their numbers, and nodes between "
+                   "those of one pin are pinned"),
      IN(drape_mesh_def, subdivide)}};
 static const char *const mesh_sources[] = {"grid", "file", NULL};
 const drape_scene_object drape_form_mesh = {.name = "mesh",

@@ -424,7 +424,7 @@ static drape_status put_json(const page *p, drape_file *file)
     uint8_t *is_pinned = drape_arena_take(&scratch, (size_t)model->surface.node_count, sizeof *is_pinned);
     drape_status status = is_pinned ? read_columns(p, DRAPE_STEPS_NAME, &of_steps, &steps) : DRAPE_E_MEMORY;
     json_object_foreach(json_object_get(p->summary, "work"), name,
-                        work) if (seen++ < DRAPE_MOST_COLUMNS - 8 && json_number_value(work) != 0)
+                        work) if (json_number_value(work) != 0 && seen++ < DRAPE_MOST_COLUMNS - 8)
         energy_names[of_energies.count++] = name;
     if (!status)
         status = read_columns(p, DRAPE_ENERGY_NAME, &of_energies, &energies);

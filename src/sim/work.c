@@ -2,24 +2,33 @@
 #include "sim/sim.h"
 
 #include <stdio.h>
+#include <string.h>
 
 /* Of a term that may do work: "drag.wind of flag", of a second one "drag.wind of flag (2)". */
 static const char *name_of(drape_sim *sim, const drape_term *t)
 {
     const drape_model *m = sim->model;
     const drape_term_ops *ops = t->ops;
-    char text[400], number[16] = "";
+    const char *of = t->seam >= 0 ? m->seams[t->seam].name : m->cloths[t->cloth].name;
+    const size_t size = strlen(ops->entry.name) + strlen(of) + 32;
     int count = 1;
     if (!drape_term_changes(t) && !ops->kinetic && !(ops->external && !ops->from_scene_gravity) &&
         !(ops->dissipation && ops->in_medium))
         return NULL;
     for (const drape_term *other = m->terms; other < t; other++)
         count += other->ops == ops && other->cloth == t->cloth && other->seam == t->seam;
-    if (count > 1)
-        snprintf(number, sizeof number, " (%d)", count);
-    snprintf(text, sizeof text, "%.60s of %.300s%s", ops->entry.name,
-             t->seam >= 0 ? m->seams[t->seam].name : m->cloths[t->cloth].name, number);
-    return drape_arena_text(sim->arena, text);
+    char *text = drape_arena_take(sim->arena, size, 1);
+    for (bool taken = text != NULL; taken; count++) { /* also by a cloth that is called "flag (2)" */
+        const int length = snprintf(text, size, "%s of %s", ops->entry.name, of);
+        if (count > 1)
+            snprintf(text + length, size - (size_t)length, " (%d)", count);
+        drape_make_printable(text);
+        taken = false;
+        for (const char *const *other = sim->workers; other < sim->workers + DRAPE_BY_TERMS + (t - m->terms);
+             other++)
+            taken = taken || (*other && strcmp(*other, text) == 0);
+    }
+    return text;
 }
 
 drape_status drape_sim_create_work(drape_sim *sim)

@@ -219,6 +219,21 @@ def test_names_of_files():
     equal(len(glob.glob("out/*_cpu*.svg")) + len(glob.glob("out/x*.svg")) >= 3, True, os.listdir("out"))
 
 
+def test_names_of_work():
+    """loads whose names would be equal have names of their own in every table; a long name is whole, one of two lines is one column"""
+    load = {"type": "load.point", "node": 4, "force": [0, 1e-3, 0]}
+    cloth = {"mesh": {"grid": "equilateral", "edges": 3, "edge_length": 0.1}, "material": {"young_modulus": 1e5, "thickness": 1e-3, "density": 200}, "pins": [{"nodes": [0]}]}
+    names = ["flag", "flag (2)", "a\nb", "\u00e4" * 200 + "1", "\u00e4" * 200 + "2"]
+    write_json("works.json", {"drape": 1, "cloth": [{**cloth, "name": name, "terms": ["stretch.edge", load] + [load] * (name == "flag")} for name in names], "duration": 0.05})
+    good("run", "works.json", "--out", "works")
+    work = read_json("works/summary.json")["work"]
+    equal(len(work), 3 + 6)
+    with open("works/energy.csv", encoding="utf-8") as file:
+        columns = file.readline().rstrip("\n").split(",")
+    equal(columns[-9:], list(work))
+    good("report", "works", "--out", "works.html")
+
+
 def test_changed_mesh():
     """an experiment goes on only with the meshes that it began with, in one folder, in shards, and while it runs"""
     def mesh(count):
